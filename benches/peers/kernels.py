@@ -1,7 +1,7 @@
-"""The peer's kernels, timed for another program: python kernels.py
+"""Times the peer's kernels for another program: python kernels.py
 
-Each line of the input is the name of a work and a number of seconds. The work is done for about as long, at least once,
-and a line of JSON tells the CPU time of each time. The first time a work is asked for, it is done once before.
+Each input line contains the name of a workload and a number of seconds. The workload runs for about this time, at least
+once. The output is a line of JSON with the CPU time of each run. Each workload runs once before its first measurement.
 """
 import os
 for threads in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS', 'NUMBA_NUM_THREADS'):
@@ -17,7 +17,7 @@ LEAST_S = 2e-3
 
 
 def outline(points, radius=100.0, waves=3):
-    """A closed curve, as ours."""
+    """Returns the same closed curve as the Rust benchmarks."""
     angle = 2 * np.pi * np.arange(points) / points
     r = radius * (1 + 0.1 * np.cos(waves * angle))
     return np.stack([r * np.cos(angle), r * np.sin(angle)], 1)
@@ -27,7 +27,7 @@ def image():
     return np.random.default_rng(1).random((HEIGHT, WIDTH), dtype=F)
 
 
-# Each makes its inputs and returns the work, and into how many parts its time is divided.
+# Each function creates its inputs and returns the workload, and the number of parts that its time is divided by.
 
 def frame():
     sim = papsim.PapSim(seed=3, accel='numba')

@@ -1,4 +1,4 @@
-//! What one cell is made of: its sheet, the texture of its nucleus, its cytoskeleton.
+//! Workloads for the parts of a cell: its sheet, the texture of its nucleus, its cytoskeleton.
 
 use std::hint::black_box;
 
@@ -6,21 +6,21 @@ use cloth_verlet::{Cloth, ClothParams, Crease, FoldKind, PixelGrid};
 use quilt_texture::{QuiltParams, Quilter, Source};
 use voronoi_cytoskeleton::{LineParams, Skeleton, SkeletonParams, draw_into};
 
-use crate::{Work, noise, rng};
+use crate::{Workload, noise, rng};
 
-/// Sheets that are pressed at once, one in each SIMD lane.
+/// Sheets pressed together, one per SIMD lane.
 pub(crate) const SHEETS: u8 = 16;
 
-/// Side of a nucleus in pixels.
+/// Image size of a nucleus in pixels.
 const NUCLEUS_PX: usize = 40;
 
-/// Side of a cell in pixels.
+/// Image size of a cell in pixels.
 const CELL_PX: usize = 200;
 
-/// Side of the picture of a sheet in pixels.
+/// Image size of a sheet in pixels.
 const SHEET_PX: usize = 220;
 
-/// A closed curve of so many points about the origin, some 100 pixels from it.
+/// Returns a closed curve around the origin, about 100 pixels from it.
 fn outline(points: u32, waves: f64) -> Vec<[f64; 2]> {
     (0..points)
         .map(|k| std::f64::consts::TAU * f64::from(k) / f64::from(points))
@@ -29,9 +29,9 @@ fn outline(points: u32, waves: f64) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// Sixteen sheets, each pressed into an outline of its own.
+/// Presses sixteen sheets, each into its own outline.
 #[must_use]
-pub fn sheets(params: &ClothParams) -> Work {
+pub fn sheets(params: &ClothParams) -> Workload {
     let cloth = Cloth::new(params).expect("the parameters are valid");
     let outlines: Vec<_> = (0..SHEETS).map(|k| outline(200, f64::from(2 + k % 5))).collect();
     let rngs: Vec<_> = (0..SHEETS).map(|k| rng(k.into())).collect();
@@ -41,9 +41,9 @@ pub fn sheets(params: &ClothParams) -> Work {
     })
 }
 
-/// The picture of a folded sheet as thickness.
+/// Draws the thickness of a folded sheet.
 #[must_use]
-pub fn thickness() -> Work {
+pub fn thickness() -> Workload {
     let cloth = Cloth::new(&ClothParams { steps: 12, ..ClothParams::default() }).expect("the parameters are valid");
     let mut sheet = cloth.crumple(&outline(200, 3.0), &mut rng(1)).expect("the outline has an area");
     let crease = Crease { point: [30.0, 10.0], direction_rad: 1.0, radius: 4.0, kind: FoldKind::Flap };
@@ -56,15 +56,15 @@ pub fn thickness() -> Work {
     })
 }
 
-/// The texture of a nucleus of 40 x 40 pixels from three donors, the paper's way.
+/// Synthesises the texture of a nucleus of 40 x 40 pixels from three donors, with the paper's parameters.
 #[must_use]
-pub fn texture() -> Work {
+pub fn texture() -> Workload {
     let offset = |i: usize| (2 * i + 1) as f32 / NUCLEUS_PX as f32 - 1.0;
     let inside = |x: f32, y: f32| if x * x + y * y < 1.0 { 1.0 } else { 0.0 };
     let mask: Vec<f32> =
         (0..NUCLEUS_PX * NUCLEUS_PX).map(|i| inside(offset(i % NUCLEUS_PX), offset(i / NUCLEUS_PX))).collect();
     let sources: Vec<_> =
-        (0..3).map(|seed| Source::new(&donor(seed), &mask, NUCLEUS_PX).expect("a disc has room for a patch")).collect();
+        (0..3).map(|seed| Source::new(&donor(seed), &mask, NUCLEUS_PX).expect("a patch fits into the disc")).collect();
     let mut rng = rng(1);
     let params = QuiltParams::paper();
     Box::new(move || {
@@ -74,7 +74,7 @@ pub fn texture() -> Work {
     })
 }
 
-/// White noise averaged over 3 x 3 pixels, with a standard deviation of about 17 grey levels.
+/// Returns white noise averaged over 3 x 3 pixels, with a standard deviation of about 17 grey levels.
 fn donor(seed: u64) -> Vec<f32> {
     let noise = noise(NUCLEUS_PX * NUCLEUS_PX, seed);
     let at = |x: usize, y: usize| noise[y % NUCLEUS_PX * NUCLEUS_PX + x % NUCLEUS_PX];
@@ -85,9 +85,9 @@ fn donor(seed: u64) -> Vec<f32> {
     (0..NUCLEUS_PX * NUCLEUS_PX).map(|i| 177.0 * mean(i)).collect()
 }
 
-/// The cytoskeleton of a cell 200 pixels wide, grown and drawn.
+/// Grows and draws the cytoskeleton of a cell 200 pixels wide.
 #[must_use]
-pub fn cytoskeleton() -> Work {
+pub fn cytoskeleton() -> Workload {
     let middle = CELL_PX as f64 / 2.0;
     let outline: Vec<_> = outline(420, 3.0).into_iter().map(|[x, y]| [middle + 0.88 * x, middle + 0.88 * y]).collect();
     let skeleton = Skeleton::new(&SkeletonParams::default()).expect("the defaults are valid");

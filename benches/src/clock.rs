@@ -1,6 +1,6 @@
-//! The clock.
+//! CPU time.
 
-/// CPU time of this process so far in seconds, user and system.
+/// Returns the CPU time of this process in seconds, user and system.
 #[must_use]
 pub fn cpu_seconds() -> f64 {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);

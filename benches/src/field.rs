@@ -1,4 +1,4 @@
-//! Whole fields by the engine.
+//! Workloads for complete fields of the engine.
 
 use std::fs;
 use std::hint::black_box;
@@ -7,37 +7,40 @@ use std::sync::atomic::AtomicBool;
 
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{Clusters, Law, Layout, Number, Preset, Recipe};
+use papsynth::recipe::{Abundance, Clusters, Law, Layout, Number, Preset, Recipe};
 use papsynth::truth::Group;
 use papsynth::{Engine, Error, Inputs, Plane, Threads};
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Run, Share};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Run, Task};
 
-use crate::{Size, Work};
+use crate::{Size, Workload};
 
 const SEED: u64 = 3;
 
-/// The recipe that mirrors the peer's defaults.
+/// Returns the recipe that corresponds to the peer's defaults.
 #[must_use]
 pub fn peer_recipe() -> Recipe {
-    toml::from_str(include_str!("../peer.toml")).expect("peer.toml is a recipe")
+    toml::from_str(include_str!("../peer.toml")).expect("peer.toml is a valid recipe")
 }
 
-/// The default recipe.
+/// Returns the default recipe.
 #[must_use]
 pub fn default_recipe() -> Recipe {
     Preset::Lbc.recipe()
 }
 
-/// A recipe on a field of another size, with as much of everything per area. Nothing is left to chance: counts that are
-/// drawn become the middle of what they are drawn from.
+/// Returns a recipe for another field size with the same density of objects. Random counts are replaced by the centre
+/// of their distribution.
 #[must_use]
 pub fn at_density(mut recipe: Recipe, [width, height]: Size) -> Recipe {
     let (width, height) = (width as f64, height as f64);
-    let share = width * height / (middle(&recipe.field.width_px) * middle(&recipe.field.height_px));
+    let share = width * height / (centre(&recipe.field.width_px) * centre(&recipe.field.height_px));
+    let pixel_mm = centre(&recipe.field.pixel_um) * 1e-3;
+    let area_mm2 = width * height * pixel_mm * pixel_mm;
+    let number = |count: &Abundance| centre(count.number()) * if count.is_density() { area_mm2 } else { share };
     recipe.field.width_px = width.into();
     recipe.field.height_px = height.into();
     if let Layout::Clusters(Clusters { count, .. }) = &mut recipe.layout {
-        *count = (share * middle(count)).round().clamp(1.0, 1e4).into();
+        *count = number(count).round().clamp(1.0, 1e4).into();
     }
     let debris = &mut recipe.debris;
     let counts = recipe.cells.values_mut().map(|mix| &mut mix.count).chain([
@@ -47,7 +50,7 @@ pub fn at_density(mut recipe: Recipe, [width, height]: Size) -> Recipe {
         &mut debris.candida.colonies,
         &mut debris.cocci.colonies,
         &mut debris.crystals.count,
-        &mut debris.dirt.drifts,
+        &mut debris.dirt.clusters,
         &mut debris.dust.count,
         &mut debris.fibres.count,
         &mut debris.leukocytes.clusters,
@@ -60,13 +63,13 @@ pub fn at_density(mut recipe: Recipe, [width, height]: Size) -> Recipe {
         &mut debris.trichomonads.groups,
     ]);
     for count in counts {
-        *count = (share * middle(count)).round().into();
+        *count = number(count).round().into();
     }
     recipe
 }
 
-/// The middle of what a number is drawn from.
-fn middle(number: &Number) -> f64 {
+/// Returns the centre of a number's distribution.
+fn centre(number: &Number) -> f64 {
     match number {
         Number::Fixed(value) => *value,
         Number::Drawn { law, .. } => match law {
@@ -77,9 +80,9 @@ fn middle(number: &Number) -> f64 {
     }
 }
 
-/// One field after the other with its truth, on the calling thread; no file is written.
+/// Generates one field after another with ground truth, on the calling thread, without writing files.
 #[must_use]
-pub fn fields(recipe: &Recipe) -> Work {
+pub fn fields(recipe: &Recipe) -> Workload {
     let engine = Engine::new(recipe, &Model::builtin(), &Inputs::default()).expect("the recipe is valid");
     let (mut ids, mut layers, mut index) = (Vec::new(), Vec::new(), 0);
     Box::new(move || {
@@ -98,20 +101,20 @@ pub fn fields(recipe: &Recipe) -> Work {
     })
 }
 
-/// Removes its folder at the end.
+/// A folder that is removed on drop.
 struct Scratch(PathBuf);
 
 impl Drop for Scratch {
     fn drop(&mut self) {
-        // What cannot be removed lies below the target folder.
+        // The folder is inside the target folder, so that errors do not matter.
         let _ = fs::remove_dir_all(&self.0);
     }
 }
 
-/// One field of the default recipe after the other, every file of image and truth written below a folder, which is removed
-/// with the work.
+/// Generates one field of the default recipe after another, and writes all files of images and ground truth to a
+/// temporary folder in `folder`.
 #[must_use]
-pub fn default_files(folder: &Path) -> Work {
+pub fn default_files(folder: &Path) -> Workload {
     let scratch = Scratch(folder.join(format!("fields-{}", std::process::id())));
     let (recipe, model) = (default_recipe(), Model::builtin());
     let engine = Engine::new(&recipe, &model, &Inputs::default()).expect("the recipe is valid");
@@ -126,13 +129,13 @@ pub fn default_files(folder: &Path) -> Work {
     let stop = AtomicBool::new(false);
     let mut index = 0;
     Box::new(move || {
-        // The folder lives as long as the work.
+        // Keeps the folder as long as the workload.
         let _ = &scratch;
         let frames = index..index + 1;
         let run = Run {
             frames,
-            share: Share::ALL,
-            at_once: 1,
+            task: Task::ALL,
+            workers: 1,
             threads: Threads::One,
             check: Check::Sizes,
             stop: &stop,

@@ -1,4 +1,4 @@
-//! What is done to a whole image: blur, noise, a background. And the point spread function of Gibson and Lanni.
+//! Workloads for complete images: blur, noise, background. Also the point spread function of Gibson and Lanni.
 
 use std::hint::black_box;
 
@@ -6,11 +6,11 @@ use ccd_noise::{Camera, CameraParams, ReadNoise};
 use optics_psf::{Border, Gaussian, GibsonLanni, GibsonLanniParams, Scratch};
 use perlin_bg::{Perlin, PerlinParams, Window};
 
-use crate::{Size, Work, noise};
+use crate::{Size, Workload, noise};
 
-/// A Gaussian blur of an image.
+/// Blurs an image with a Gaussian.
 #[must_use]
-pub fn blur([width, height]: Size, sigma_px: f64) -> Work {
+pub fn blur([width, height]: Size, sigma_px: f64) -> Workload {
     let gaussian = Gaussian::new(sigma_px).expect("the width is finite");
     let image = noise(width * height, 1);
     let (mut blurred, mut scratch) = (image.clone(), Scratch::new());
@@ -20,10 +20,10 @@ pub fn blur([width, height]: Size, sigma_px: f64) -> Work {
     })
 }
 
-/// Exact Poisson noise of 17 850 electrons a pixel and read noise, up to grey levels.
+/// Adds exact Poisson noise of 17 850 electrons per pixel and read noise, and converts to grey levels.
 #[must_use]
-pub fn exposure([width, height]: Size) -> Work {
-    // Room above the mean, so that nothing is clipped.
+pub fn exposure([width, height]: Size) -> Workload {
+    // Headroom above the mean, so that no pixel saturates.
     let params = CameraParams {
         full_well_e: 20_000.0,
         gain_dn_per_e: 255.0 / 20_000.0,
@@ -41,9 +41,9 @@ pub fn exposure([width, height]: Size) -> Work {
     })
 }
 
-/// An octave of Perlin noise with cells of 64 pixels.
+/// Adds an octave of Perlin noise with cells of 64 pixels.
 #[must_use]
-pub fn perlin([width, height]: Size) -> Work {
+pub fn perlin([width, height]: Size) -> Workload {
     let perlin = Perlin::new(&PerlinParams::default(), 7).expect("the defaults are valid");
     let window = Window::with_cell_px(64.0);
     let mut image = vec![0.0; width * height];
@@ -53,19 +53,18 @@ pub fn perlin([width, height]: Size) -> Work {
     })
 }
 
-/// Pixels of the point spread function on either side of the middle, its planes, the size of a pixel, the distance of planes.
+/// Point spread function: pixels on each side of the centre, number of planes, pixel size, distance of planes.
 const HALF: usize = 63;
 const PLANES: u32 = 21;
 const PIXEL_UM: f64 = 0.05;
 const STEP_UM: f64 = 0.2;
 
-/// Points along the side of a pixel over which a pixel is averaged, and at which the profile is known: as many as
-/// psfmodels has.
+/// Samples per pixel side, for the mean over a pixel and for the radial profile, as in psfmodels.
 const FINE: usize = 3;
 
-/// The point spread function of 127 x 127 x 21 pixels, each averaged over 3 x 3 points.
+/// Computes a point spread function of 127 x 127 x 21 pixels, each the mean of 3 x 3 samples.
 #[must_use]
-pub fn gibson_lanni() -> Work {
+pub fn gibson_lanni() -> Workload {
     // The defaults of psfmodels.
     let params = GibsonLanniParams {
         na: 1.4,
@@ -82,10 +81,10 @@ pub fn gibson_lanni() -> Work {
     })
 }
 
-/// The point spread function is round, so that an eighth of a plane is enough: the rest mirrors it.
+/// The point spread function is rotationally symmetric: an eighth of a plane is computed, the rest mirrored.
 fn volume(psf: &GibsonLanni, z_um: &[f64]) -> Vec<f32> {
     let side = 2 * HALF + 1;
-    // Enough for the corner of the plane, and one more for what lies between two.
+    // Reaches the corner of the plane, plus one sample for interpolation.
     let radii = (HALF + 1) * FINE * 3 / 2 + 2;
     let r_um: Vec<f64> = (0..radii).map(|k| k as f64 * PIXEL_UM / FINE as f64).collect();
     let profile = psf.profile(&r_um, z_um).expect("the distances are small");
@@ -95,7 +94,7 @@ fn volume(psf: &GibsonLanni, z_um: &[f64]) -> Vec<f32> {
     for (plane, row) in volume.chunks_exact_mut(side * side).zip(profile.chunks_exact(radii)) {
         for (i, points) in places.chunks_exact(FINE * FINE).enumerate() {
             let sum: f64 = points.iter().map(|&(k, part)| row[k] + part * (row[k + 1] - row[k])).sum();
-            #[expect(clippy::cast_possible_truncation, reason = "an intensity in single precision, as psfmodels has")]
+            #[expect(clippy::cast_possible_truncation, reason = "intensities use single precision, as in psfmodels")]
             let sum = sum as f32;
             eighth[i] = sum / (FINE * FINE) as f32;
         }
@@ -111,7 +110,7 @@ fn volume(psf: &GibsonLanni, z_um: &[f64]) -> Vec<f32> {
     volume
 }
 
-/// Where in the profile each point of each pixel of an eighth of a plane lies: the radius below it, and how far beyond.
+/// Returns the profile index below each sample of an eighth of a plane, and the fraction above it.
 fn places() -> Vec<(usize, f64)> {
     let mut places = Vec::new();
     let fine = |pixel: usize, k: usize| (pixel * FINE + k) as f64 - (FINE / 2) as f64;

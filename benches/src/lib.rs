@@ -1,9 +1,10 @@
-//! Works of the techniques and of the engine, as they are timed beside other programs and counted in instructions.
+//! Workloads of the techniques and of the engine, for timing against other programs and for counting instructions.
 //!
-//! A [`Work`] has its inputs; calling it does the work once. Inputs are fixed, seeds too, nothing runs on a second thread.
+//! A [`Workload`] contains its inputs; each call performs it once. Inputs and seeds are fixed, and everything runs on
+//! one thread.
 
 #![forbid(unsafe_code)]
-#![expect(clippy::missing_panics_doc, reason = "inputs are constants: what panics is a work that is broken")]
+#![expect(clippy::missing_panics_doc, reason = "inputs are constants: a panic is a bug in the workload")]
 
 mod cell;
 mod clock;
@@ -17,22 +18,22 @@ pub use field::{at_density, default_files, default_recipe, fields, peer_recipe};
 pub use frame::{blur, exposure, gibson_lanni, perlin};
 pub use named::{Timed, named};
 
-/// Something that is done again and again, its inputs made.
-pub type Work = Box<dyn FnMut()>;
+/// A repeatable operation with its inputs.
+pub type Workload = Box<dyn FnMut()>;
 
-/// Side of a square in pixels, or width and height of a rectangle.
+/// Width and height in pixels.
 pub type Size = [usize; 2];
 
-/// A frame of the camera, in pixels.
+/// Size of a camera frame in pixels.
 pub const FRAME: Size = [1376, 1038];
 
-/// The generator of a seed.
+/// Returns a random number generator.
 fn rng(seed: u64) -> rand_xoshiro::Xoshiro256PlusPlus {
     use rand_xoshiro::rand_core::SeedableRng;
     rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(seed)
 }
 
-/// Even random numbers from 0 to 1.
+/// Returns uniform random numbers from 0 to 1.
 fn noise(len: usize, seed: u64) -> Vec<f32> {
     use rand_xoshiro::rand_core::Rng;
     let mut rng = rng(seed);

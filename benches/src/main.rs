@@ -1,11 +1,11 @@
-//! Times works for another program: `papsynth-benches FOLDER`.
+//! Times workloads for another program: `papsynth-benches FOLDER`.
 //!
-//! Each line of the input is a name of a work and a number of seconds. The work is done for about as long, at least once, and a line of
-//! JSON tells the CPU time of each time. The first time a work is asked for, it is done once before. Files that
-//! works write go below the folder.
+//! Each input line contains the name of a workload and a number of seconds. The workload runs for about this time, at
+//! least once. The output is a line of JSON with the CPU time of each run. Each workload runs once before its first
+//! measurement. Output files are written to the folder.
 
 #![forbid(unsafe_code)]
-#![expect(clippy::print_stdout, reason = "what it measures is its output")]
+#![expect(clippy::print_stdout, reason = "prints its measurements")]
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -14,24 +14,24 @@ use std::path::PathBuf;
 
 use papsynth_benches::{Timed, cpu_seconds, named};
 
-/// Works shorter than this are done several times between two looks at the clock.
+/// Shorter workloads run several times per clock reading.
 const LEAST_S: f64 = 2e-3;
 
-/// A work that has been done before, and how often it is done between two looks at the clock.
+/// A workload after its first run, and its runs per clock reading.
 struct Warm {
     timed: Timed,
     at_once: u32,
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let folder = PathBuf::from(std::env::args().nth(1).ok_or("a folder for files is missing")?);
+    let folder = PathBuf::from(std::env::args().nth(1).ok_or("missing argument: folder for output files")?);
     let mut known = BTreeMap::new();
     for line in stdin().lines() {
         let line = line?;
         let (name, seconds) = line.split_once(' ').ok_or("expected a name and seconds")?;
         let seconds: f64 = seconds.trim().parse()?;
         if !known.contains_key(name) {
-            let timed = named(name, &folder).ok_or_else(|| format!("there is no work `{name}`"))?;
+            let timed = named(name, &folder).ok_or_else(|| format!("unknown workload `{name}`"))?;
             known.insert(name.to_owned(), warm(timed));
         }
         if let Some(work) = known.get_mut(name) {
@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Does a work once, and short ones once more to see how long they take.
+/// Runs a workload once, and short ones again to measure their duration.
 fn warm(mut timed: Timed) -> Warm {
     let mut once = || {
         let start = cpu_seconds();
@@ -52,12 +52,12 @@ fn warm(mut timed: Timed) -> Warm {
     };
     let first = once();
     let usual = if first < 0.1 { once() } else { first };
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a float to whole saturates")]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "float to integer casts saturate")]
     let at_once = (LEAST_S / usual.max(1e-9)).ceil() as u32;
     Warm { timed, at_once }
 }
 
-/// CPU seconds of each time.
+/// Returns the CPU seconds of each run.
 fn measure(Warm { timed, at_once }: &mut Warm, seconds: f64) -> Vec<f64> {
     let begin = cpu_seconds();
     let mut figures = Vec::new();

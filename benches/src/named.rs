@@ -1,4 +1,4 @@
-//! Works by the names under which other programs ask for them.
+//! Workloads by name.
 
 use std::path::Path;
 
@@ -6,31 +6,31 @@ use cloth_verlet::ClothParams;
 
 use crate::cell::SHEETS;
 use crate::{
-    FRAME, Size, Work, at_density, blur, cytoskeleton, default_files, default_recipe, exposure, fields, gibson_lanni,
+    FRAME, Size, Workload, at_density, blur, cytoskeleton, default_files, default_recipe, exposure, fields, gibson_lanni,
     peer_recipe, perlin, sheets, texture,
 };
 
-/// A work, and into how many parts its time is divided.
+/// A workload and the number of parts that its time is divided by.
 pub struct Timed {
-    /// The work.
-    pub work: Work,
-    /// Parts of equal length.
+    /// The workload.
+    pub work: Workload,
+    /// Number of equal parts.
     pub parts: f64,
 }
 
-/// The work of a name; none if there is no such work.
+/// Returns the workload of a name, or `None` for an unknown name.
 ///
-/// `pixels-SIDE` is the default recipe on a square of that side, `cells-COUNT` the peer's recipe on a field for that many
-/// cells, both with as much of everything per area. Files are written below `folder`.
+/// `pixels-SIDE` is the default recipe on a square of this size. `cells-COUNT` is the peer's recipe on a field for this
+/// many cells. Both keep the density of objects. Files are written to `folder`.
 #[must_use]
 pub fn named(name: &str, folder: &Path) -> Option<Timed> {
     let whole = |work| Some(Timed { work, parts: 1.0 });
     let sheet = ClothParams::paper();
     match name {
         "default-frame" => whole(default_files(folder)),
-        // A sheet.
+        // Per sheet.
         "cloth-538" => Some(Timed { work: sheets(&sheet), parts: f64::from(SHEETS) }),
-        // A step of a sheet.
+        // Per step of a sheet.
         "cloth-10000" => {
             let params = ClothParams { vertices: 10_000, outline_points: 330, ..sheet };
             Some(Timed { work: sheets(&params), parts: f64::from(SHEETS) * params.steps as f64 })
@@ -53,13 +53,13 @@ pub fn named(name: &str, folder: &Path) -> Option<Timed> {
     }
 }
 
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a size that someone has typed")]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a size from the command line")]
 fn square(side: f64) -> Size {
     [side as usize; 2]
 }
 
-/// The size of a field, of the same form as the peer's, with room for so many cells at the peer's density.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a size that someone has typed")]
+/// Returns the size of a field with the peer's aspect ratio and cell density for a number of cells.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a size from the command line")]
 fn room_for(cells: f64) -> Size {
     const CELLS: f64 = 30.0;
     FRAME.map(|side| (side as f64 * (cells / CELLS).sqrt()).round() as usize)

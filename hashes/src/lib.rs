@@ -1,4 +1,4 @@
-//! Hashes of what small recipes give: `fixtures/hashes.txt` holds them, and every machine has to find the same.
+//! Hashes of the output of small recipes. `fixtures/hashes.txt` contains the expected values for every machine.
 
 #![forbid(unsafe_code)]
 
@@ -12,14 +12,14 @@ use papsynth::truth::Group;
 use papsynth::{Engine, Error, Frame, Inputs};
 use sha2::{Digest, Sha256};
 
-/// The seed of all of them.
+/// Seed of all recipes.
 const SEED: u64 = 20_150_624;
 
-/// One line for each recipe and stage, `recipe stage hash`, from the scene on: the first stage that differs tells where to
-/// look.
+/// Returns one line per recipe and stage, `recipe stage hash`, in order of computation. The first different stage
+/// locates a deviation.
 ///
 /// # Errors
-/// If a recipe cannot be made.
+/// If a recipe is invalid.
 pub fn lines() -> Result<String, Error> {
     let mut lines = String::new();
     for (name, recipe) in recipes() {
@@ -32,7 +32,7 @@ pub fn lines() -> Result<String, Error> {
     Ok(lines)
 }
 
-/// Small fields that pass through every model of light, colour and stack, and every kind of object.
+/// Returns small fields that cover every model of light, colour and stack, and every kind of object.
 fn recipes() -> Vec<(&'static str, Recipe)> {
     let mut recipes: Vec<(&str, Recipe)> = Preset::ALL.map(|preset| (preset.name(), small(preset, [192, 144]))).into();
     let mut stack = small(Preset::HighGrade, [128, 96]);
@@ -67,7 +67,7 @@ fn in_colour() -> Light {
     })
 }
 
-/// A preset on a field of so few pixels that a handful of cells fills it.
+/// Returns a preset on a field so small that a few cells fill it.
 fn small(preset: Preset, [width, height]: [u16; 2]) -> Recipe {
     let mut recipe = preset.recipe();
     recipe.field.width_px = Number::Fixed(width.into());
@@ -82,10 +82,10 @@ fn small(preset: Preset, [width, height]: [u16; 2]) -> Recipe {
     recipe
 }
 
-/// SHA-256 of everything that a frame is.
+/// Returns SHA-256 hashes of all parts of a frame.
 fn hashes(frame: &Frame) -> [(&'static str, String); 5] {
     let Frame { planes, finished } = frame;
-    // Debug text has every digit of every number, as have the tables.
+    // Debug output contains every digit of every number, as do the tables.
     let scene = Hash::default().text(&format!("{:?}", finished.scene));
     let truth = Hash::default().text(&format!("{:?}", finished.truth));
     let labels = Group::ALL.iter().fold(Hash::default(), |hash, &group| {

@@ -1,4 +1,4 @@
-//! Prints the hashes, one a line.
+//! Prints the hashes, one per line.
 
 #![forbid(unsafe_code)]
 

@@ -48,7 +48,7 @@ pub(crate) fn run(workspace: &Workspace, quick: bool) -> Result<()> {
         for (what, recipe) in recipes {
             let fields = folder.join(format!("fields-{what}-{grade}"));
             // The real fields are of many slides.
-            let words = ["--frames", FRAMES, "--set", "slide.fields=1"].map(PathBuf::from);
+            let words = ["--frames", FRAMES, "--set", "slide.fields_per_slide=1"].map(PathBuf::from);
             dataset::generate(program(workspace), &fields, recipe.into_iter().chain(words))?;
             let report = folder.join(format!("report-{what}-{grade}"));
             let mut judge = program(workspace);
@@ -156,10 +156,10 @@ fn forest(
         "field.pixel_um=0.31",
         "field.width_px=800",
         "field.height_px=700",
-        "focus.picture=extended",
+        "focus.output=edf",
         "focus.planes=11",
         "focus.step_um=1.0",
-        "slide.fields=1",
+        "slide.fields_per_slide=1",
     ];
     let words = ["--frames", "26"].into_iter().chain(settings.iter().flat_map(|setting| ["--set", setting]));
     dataset::generate(program(workspace), &fields, recipe.into_iter().chain(words.map(PathBuf::from)))?;

@@ -53,14 +53,14 @@ pub(crate) struct Torture {
 
 pub(crate) fn torture(workspace: &Workspace, numbers: &Torture) -> Result<()> {
     for (package, filter) in [
-        ("papsynth-cli", "sets::whatever_is_killed"),
+        ("papsynth-cli", "sets::the_next_run_completes"),
         ("papsynth-cli", "sets::a_full_disk"),
         ("papsynth-dataset", "verifying::damage::every_"),
         ("papsynth-cli", "hostile::"),
         ("papsynth-dataset", "corpus::"),
         ("papsynth-cli", "memory::"),
         ("papsynth", "slide::windows_of_tiles"),
-        ("ccd-noise", "laws::"),
+        ("ccd-noise", "properties::"),
     ] {
         let mut cargo = workspace.cargo();
         cargo.args(["test", "--release", "--package", package, "--test", "it", filter]);

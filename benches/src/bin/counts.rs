@@ -1,29 +1,30 @@
-//! Does one small work under valgrind: `cargo xtask bench counts` compares how many instructions it takes with `counts.json`.
+//! Runs a small workload under valgrind. `cargo xtask bench counts` compares its instructions with `counts.json`.
 //!
-//! Without arguments the program prints the names of the works. With a name it does this work, whose instructions are those inside [`counted`].
+//! Without arguments the program prints the names of the workloads. With a name it runs this workload; the counted
+//! instructions are those inside [`counted`].
 
 #![forbid(unsafe_code)]
-#![expect(clippy::print_stdout, reason = "the names are its output")]
+#![expect(clippy::print_stdout, reason = "prints the names")]
 
 use std::error::Error;
 
 use cloth_verlet::ClothParams;
 use papsynth_benches::{
-    Work, at_density, blur, cytoskeleton, default_recipe, exposure, fields, peer_recipe, perlin, sheets, texture,
+    Workload, at_density, blur, cytoskeleton, default_recipe, exposure, fields, peer_recipe, perlin, sheets, texture,
     thickness,
 };
 
-/// An image of small works.
+/// Image size of small workloads.
 const SMALL: [usize; 2] = [192, 144];
 
-/// A field of small works: a few cells.
+/// Field size of small workloads: a few cells.
 const FIELD: [usize; 2] = [344, 260];
 
-/// What is counted of a work: its name, how often it is done before, and what makes it.
-type Counted = (&'static str, usize, fn() -> Work);
+/// Name of a workload, number of runs before counting, and constructor.
+type Counted = (&'static str, usize, fn() -> Workload);
 
-/// Every work: its name, how often it is done before it is counted, and what makes it. The first time makes tables that are made
-/// once; a few cells a field meet the four periodic diagrams of the cytoskeleton only by and by: as many fields as meet them all.
+/// All workloads: name, number of runs before counting, and constructor. The first run creates cached tables. The four
+/// periodic diagrams of the cytoskeleton are created on demand; the number of runs suffices to create all of them.
 const WORKS: [Counted; 12] = [
     ("sheets_paper", 1, || sheets(&ClothParams { steps: 6, ..ClothParams::paper() })),
     ("sheets_default", 1, || sheets(&ClothParams { steps: 2, ..ClothParams::default() })),
@@ -44,15 +45,15 @@ fn main() -> Result<(), Box<dyn Error>> {
         WORKS.iter().for_each(|(name, ..)| println!("{name}"));
         return Ok(());
     };
-    let (_, before, make) = WORKS.iter().find(|work| work.0 == name).ok_or("there is no such work")?;
+    let (_, before, make) = WORKS.iter().find(|work| work.0 == name).ok_or("unknown workload")?;
     let mut work = make();
     (0..*before).for_each(|_| work());
     counted(&mut work);
     Ok(())
 }
 
-/// Does a work; valgrind counts what happens in here, by the name of this function.
+/// Runs a workload. valgrind counts the instructions of this function, by its name.
 #[inline(never)]
-fn counted(work: &mut Work) {
+fn counted(work: &mut Workload) {
     work();
 }

@@ -1,5 +1,4 @@
-//! How long does the noise of a camera frame take: its deviates alone, the whole exposure, and what more of a camera and JPEG
-//! add to it?
+//! Benchmarks of noise deviates, of the exposure of a frame with different camera models, and of JPEG compression.
 
 use ccd_noise::{Blooming, Camera, CameraParams, Jpeg, JpegParams, NoiseField, PhotonNoise, ReadNoise, Subsampling};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
@@ -7,7 +6,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 const WIDTH: usize = 1376;
 const PIXELS: usize = WIDTH * 1038;
 
-/// A field of cells: 14 000 electrons in the background, 8 000 in the objects.
+/// Mean electrons of a field of cells: 14 000 in the background, 8 000 in the objects.
 fn scene() -> Vec<f32> {
     let object = |i: usize| (i % WIDTH / 50 + i / WIDTH / 50).is_multiple_of(2);
     (0..PIXELS).map(|i| if object(i) { 8e3 } else { 14e3 }).collect()
@@ -38,7 +37,7 @@ fn frame(c: &mut Criterion) {
     for (name, params) in [
         ("exact", even.clone()),
         ("one normal", CameraParams { photon_noise: PhotonNoise::NormalAbove { mean_e: 200.0 }, ..even.clone() }),
-        ("read noise alone", CameraParams { photon_noise: PhotonNoise::Off, ..even.clone() }),
+        ("read noise only", CameraParams { photon_noise: PhotonNoise::Off, ..even.clone() }),
         ("exact, PRNU and DSNU", uneven.clone()),
         ("exact, PRNU and DSNU, read noise per pixel", CameraParams { read_noise: per_pixel, ..uneven }),
     ] {
@@ -49,7 +48,7 @@ fn frame(c: &mut Criterion) {
     }
     let mut runs = Vec::new();
     let camera = Camera::new(&even).expect("valid parameters");
-    group.bench_function("exact, saturated pixels noted", |b| {
+    group.bench_function("exact, with saturated runs", |b| {
         b.iter(|| {
             runs.clear();
             camera.expose_window_marking(&electrons, WIDTH, [0, 0], 1, &mut out, &mut runs)
@@ -57,7 +56,7 @@ fn frame(c: &mut Criterion) {
     });
     let blooming = Blooming::On { vertical: 0.95, anti_blooming: 0.0 };
     let camera = Camera::new(&CameraParams { blooming, full_well_e: 13_000.0, ..even }).expect("valid parameters");
-    group.bench_function("exact, half of it blooming", |b| {
+    group.bench_function("exact, half of the pixels blooming", |b| {
         b.iter(|| {
             runs.clear();
             camera.expose_frame(&electrons, WIDTH, 1, &mut out, &mut runs)
@@ -81,7 +80,7 @@ fn jpeg(c: &mut Criterion) {
             jpeg.grey(&mut image, WIDTH);
         });
     });
-    for subsampling in [Subsampling::Full, Subsampling::Squares] {
+    for subsampling in [Subsampling::S444, Subsampling::S420] {
         let jpeg = Jpeg::new(&JpegParams { subsampling, ..JpegParams::default() }).expect("valid parameters");
         let mut image = rgb.clone();
         group.bench_function(BenchmarkId::new("rgb", format!("{subsampling:?}")), |b| {

@@ -1,6 +1,8 @@
-//! Writes the frames that EMVA 1288 asks for, of one preset, for the judge `tests/external_emva.py`: two frames of the dark and
-//! of 50 levels of light, 64 of the dark and of half of saturation, a list of them, and what should be found. Arguments:
-//! the preset and a folder.
+//! Writes a frame set as EMVA 1288 specifies, for `tests/external_emva.py`: two frames of the dark level and of 50
+//! levels of light, 64 frames of the dark level and of half of saturation, a list of the frames, and the expected
+//! results.
+//!
+//! Usage: `cargo run --example emva1288 [PRESET] [FOLDER]`
 
 use std::error::Error;
 use std::fmt::Write;
@@ -14,7 +16,7 @@ const WIDTH: u32 = 320;
 const HEIGHT: u32 = 256;
 const LEVELS: u64 = 50;
 const PATTERN_FRAMES: u64 = 64;
-/// Of saturation, so that the last levels are beyond it.
+/// Fraction of saturation; the last levels are saturated.
 const BRIGHTEST: f64 = 1.05;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -25,7 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         "paper" => CameraParams::paper(),
         "orca-05g" => CameraParams::orca_05g(),
         "scmos" => CameraParams::scmos(),
-        other => return Err(format!("there is no preset {other}; there are paper, orca-05g and scmos").into()),
+        other => return Err(format!("unknown preset `{other}`: expected paper, orca-05g or scmos").into()),
     };
     let folder = Path::new(&folder);
     fs::create_dir_all(folder)?;
@@ -33,9 +35,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let nanoseconds = 1e9 * params.exposure_s;
     let mut list = format!("v 4.0\nn {} {WIDTH} {HEIGHT}\n", params.bit_depth);
     let mut key = 0;
-    let mut level = |share: f64, frames: u64| -> Result<(), Box<dyn Error>> {
-        let electrons = share * camera.saturation_e();
-        match share > 0.0 {
+    let mut level = |fraction: f64, frames: u64| -> Result<(), Box<dyn Error>> {
+        let electrons = fraction * camera.saturation_capacity_e();
+        match fraction > 0.0 {
             true => writeln!(list, "b {nanoseconds} {}", electrons / params.quantum_efficiency)?,
             false => writeln!(list, "d {nanoseconds}")?,
         }
@@ -70,7 +72,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "pixels are single precision")]
+#[expect(clippy::cast_possible_truncation, reason = "frames take single precision")]
 fn single(value: f64) -> f32 {
     value as f32
 }

@@ -1,5 +1,5 @@
-//! Writes a grey and a colour frame as they are and as JPEG of several qualities leaves them, for the judge
-//! `tests/external_jpeg.py`. The folder may be given as argument.
+//! Writes a grey and a colour frame before and after JPEG compression at several qualities, for
+//! `tests/external_jpeg.py`. Optional argument: the output folder.
 
 use std::error::Error;
 use std::fs;
@@ -8,7 +8,7 @@ use std::path::Path;
 use ccd_noise::{Camera, CameraParams, Jpeg, JpegParams, Subsampling};
 use image::{GrayImage, RgbImage};
 
-/// No multiple of 8 or 16, so that there are blocks to fill.
+/// Not a multiple of 8 or 16, so that the last blocks need padding.
 const WIDTH: u32 = 301;
 const HEIGHT: u32 = 203;
 
@@ -16,7 +16,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args().nth(1).unwrap_or_else(|| "target/jpeg".to_owned());
     let folder = Path::new(&folder);
     fs::create_dir_all(folder)?;
-    let grey = GrayImage::from_raw(WIDTH, HEIGHT, frame(1)?).ok_or("a frame of another size")?;
+    let grey = GrayImage::from_raw(WIDTH, HEIGHT, frame(1)?).ok_or("the frame has an unexpected size")?;
     let channels = [frame(1)?, frame(2)?, frame(3)?];
     let rgb = RgbImage::from_fn(WIDTH, HEIGHT, |x, y| {
         let i = (y * WIDTH + x) as usize;
@@ -25,11 +25,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     grey.save(folder.join("grey.png"))?;
     rgb.save(folder.join("rgb.png"))?;
     for quality in [10, 50, 75, 90, 95, 100] {
-        for (subsampling, name) in [(Subsampling::Full, 444), (Subsampling::Columns, 422), (Subsampling::Squares, 420)]
-        {
+        for (subsampling, name) in [(Subsampling::S444, 444), (Subsampling::S422, 422), (Subsampling::S420, 420)] {
             let jpeg = Jpeg::new(&JpegParams { quality, subsampling, ..JpegParams::default() })?;
             let (mut grey, mut rgb) = (grey.clone(), rgb.clone());
-            if subsampling == Subsampling::Full {
+            if subsampling == Subsampling::S444 {
                 jpeg.grey(&mut grey, WIDTH as usize);
                 grey.save(folder.join(format!("grey_{quality}.png")))?;
             }
@@ -40,7 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Spots of different sizes on an uneven ground, noise and all.
+/// Returns a frame of spots of different sizes on an uneven background, with noise.
 #[expect(clippy::cast_possible_truncation, reason = "8 bits")]
 fn frame(channel: u16) -> Result<Vec<u8>, ccd_noise::Error> {
     let camera = Camera::new(&CameraParams::default())?;

@@ -1,10 +1,11 @@
 use crate::error::{Error, within};
-use crate::field::whole_rows;
+use crate::field::assert_rows;
 use crate::{CameraParams, ReadNoise};
 
-/// How the pixels of a square are made one.
+/// Pixel binning: `side` × `side` pixels become one.
 ///
-/// With n = side² pixels, [`CameraParams::binned`] gives a binned pixel
+/// With n = side² pixels, [`CameraParams::binned`] sets these values for a binned pixel, in electrons of the complete
+/// square:
 ///
 /// | | charge | digital |
 /// |---|---|---|
@@ -14,25 +15,26 @@ use crate::{CameraParams, ReadNoise};
 /// | DSNU | side times | side times |
 /// | read noise² | σ² | n·σ² + n / 12K² |
 ///
-/// in electrons of the whole square. The scale of grey levels stays as it is: the mean of n equal pixels has their level.
-/// Charge is read once; digitally, n readings are averaged, whose own roundings, 1/12 each, are the last term.
+/// The scale of grey levels does not change: a square of n equal pixels has the same mean level as one of these pixels.
+/// Charge binning reads each square once. Digital binning averages n readings; the last term is their quantisation
+/// noise, 1/12 each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Binning {
-    /// The charges are joined on the sensor and read once, as in a CCD. The register is taken to hold n full wells; lower
-    /// [`CameraParams::full_well_e`] if it does not.
+    /// Sums charge on the sensor and reads it once, as in a CCD. The register is assumed to hold n full wells; lower
+    /// [`CameraParams::full_well_e`] otherwise.
     Charge {
-        /// Pixels along a side of the square, 1 to 8.
+        /// Side of the square in pixels, 1 to 8.
         side: usize,
     },
-    /// The pixels are read one by one and their levels averaged, as in CMOS.
+    /// Reads each pixel and averages the grey levels, as in CMOS.
     Digital {
-        /// Pixels along a side of the square, 1 to 8.
+        /// Side of the square in pixels, 1 to 8.
         side: usize,
     },
 }
 
 impl Binning {
-    /// Pixels along a side of the square.
+    /// Returns the side of the square in pixels.
     #[must_use]
     pub fn side(self) -> usize {
         match self {
@@ -40,15 +42,15 @@ impl Binning {
         }
     }
 
-    /// Sums `electrons`, rows of `width` pixels, over squares. Columns and rows at the right and at the bottom that do
-    /// not fill a square are left out. Returns the binned image and its width.
+    /// Sums `electrons`, in rows of `width` pixels, over squares. Returns the binned image and its width. Incomplete
+    /// squares at the right and bottom edges are dropped.
     ///
     /// # Panics
     ///
-    /// If `electrons` is not whole rows of `width`.
+    /// If the length of `electrons` is not a multiple of `width`.
     #[must_use]
-    pub fn gather(self, electrons: &[f32], width: usize) -> (Vec<f32>, usize) {
-        whole_rows(electrons.len(), width);
+    pub fn sum_electrons(self, electrons: &[f32], width: usize) -> (Vec<f32>, usize) {
+        assert_rows(electrons.len(), width);
         let side = self.side().max(1);
         let binned_width = width / side;
         let mut binned = Vec::with_capacity(electrons.len() / (side * side));
@@ -66,11 +68,11 @@ impl Binning {
 }
 
 impl CameraParams {
-    /// The camera whose pixels are squares of those of this one. It expects the electrons of a whole
-    /// square, as [`Binning::gather`] sums them.
+    /// Returns the parameters of this camera with `binning`. The binned camera takes the electrons of complete squares,
+    /// as [`Binning::sum_electrons`] returns them.
     ///
-    /// The log-normal read noise of n pixels together is again taken as log-normal, of the right mean square and the
-    /// right variance of the squares (Fenton, doi:10.1109/TCOM.1960.1097606).
+    /// The sum of n log-normal read noise variances is approximated by a log-normal distribution of the same mean and
+    /// variance (Fenton, doi:10.1109/TCOM.1960.1097606).
     ///
     /// # Errors
     ///
@@ -86,7 +88,7 @@ impl CameraParams {
                 match noise {
                     ReadNoise::Same { .. } => ReadNoise::Same { e: rms_e },
                     ReadNoise::PerPixel { median_e, rms_e: one } => {
-                        // Of the squares: exp(4s²) - 1 is their variance over the square of their mean.
+                        // Relative variance of the per-pixel noise variances: exp(4s²) - 1.
                         let uneven = one / median_e;
                         let relative = one * one / (one * one + rounding);
                         let variance = (uneven * uneven * uneven * uneven - 1.0) * relative * relative / n;

@@ -1,8 +1,9 @@
-//! Blooming: charge that a full pixel cannot hold, on its way. Whole electrons, so that none is lost to rounding.
+//! Blooming: moves excess charge to neighbouring pixels. Charge is counted in whole electrons, so that none is lost to
+//! rounding.
 
 use crate::exposure::Exposure;
 
-/// Leaves no pixel with more than `well` electrons. Saturated pixels are not counted yet.
+/// Moves charge until no pixel holds more than `well` electrons. Does not count saturated pixels.
 pub(crate) fn spread(charge: &mut [u32], width: usize, well: u32, vertical: f64, anti_blooming: f64) -> Exposure {
     let mut spill = Exposure::default();
     if charge.iter().all(|&c| c <= well) {
@@ -14,11 +15,11 @@ pub(crate) fn spread(charge: &mut [u32], width: usize, well: u32, vertical: f64,
             sideways.fill(0);
             for (x, charge) in row.iter_mut().enumerate().filter(|(_, charge)| **charge > well) {
                 let excess = *charge - well;
-                let drained = share(excess, anti_blooming);
-                let aside = share(excess - drained, 1.0 - vertical);
+                let drained = fraction_of(excess, anti_blooming);
+                let aside = fraction_of(excess - drained, 1.0 - vertical);
                 *charge -= drained + aside;
                 spill.drained_e += u64::from(drained);
-                // Of an odd number, the last goes to the left in every other column.
+                // Odd counts: the last electron goes left in even columns, right in odd columns.
                 let left = (aside + u32::from(x.is_multiple_of(2))) / 2;
                 sideways[x] += left;
                 sideways[x + 2] += aside - left;
@@ -29,7 +30,7 @@ pub(crate) fn spread(charge: &mut [u32], width: usize, well: u32, vertical: f64,
             }
         }
     }
-    // Half of it goes down, and what remains goes up.
+    // Half of the excess moves down. A second pass moves the remainder up.
     let mut carried = vec![0; width];
     for row in charge.chunks_exact_mut(width) {
         carry(row, &mut carried, well, |excess| excess / 2);
@@ -43,7 +44,7 @@ pub(crate) fn spread(charge: &mut [u32], width: usize, well: u32, vertical: f64,
     spill
 }
 
-/// Takes `part` of what a row has above `well` along, and leaves as much in it as it has room for.
+/// Moves `part` of the excess above `well` along, and fills free capacity of the row from `carried`.
 #[inline(always)]
 fn carry(row: &mut [u32], carried: &mut [u64], well: u32, part: impl Fn(u32) -> u32) {
     for (charge, carried) in row.iter_mut().zip(carried) {
@@ -55,12 +56,12 @@ fn carry(row: &mut [u32], carried: &mut [u64], well: u32, part: impl Fn(u32) -> 
     }
 }
 
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not more than the whole")]
-fn share(whole: u32, of: f64) -> u32 {
-    (f64::from(whole) * of) as u32
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most `whole`")]
+fn fraction_of(whole: u32, fraction: f64) -> u32 {
+    (f64::from(whole) * fraction) as u32
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "the room of a pixel")]
+#[expect(clippy::cast_possible_truncation, reason = "at most the free capacity of a pixel")]
 fn narrow(charge: u64) -> u32 {
     charge as u32
 }
@@ -90,7 +91,9 @@ mod tests {
                 let spill = spread(&mut charge, width, well, vertical, anti_blooming);
                 assert_eq!(sum(&charge) + spill.drained_e + spill.escaped_e, before);
                 assert!(charge.iter().all(|&c| c <= well));
-                assert!(spill.drained_e.abs_diff(share(u32::try_from(excess).unwrap(), anti_blooming).into()) < 10);
+                assert!(
+                    spill.drained_e.abs_diff(fraction_of(u32::try_from(excess).unwrap(), anti_blooming).into()) < 10
+                );
             }
         }
     }
@@ -109,13 +112,13 @@ mod tests {
                 assert_eq!(charge[y * width + x], if full { 100 } else { 40 }, "{x} {y}");
             }
         }
-        // Sideways it is as even: the streak is a cross with its neighbours' columns.
+        // Horizontal blooming is symmetric: both neighbouring columns receive a quarter.
         let mut charge = vec![0; width * height];
         charge[50 * width + 4] = 100 + 1000;
         spread(&mut charge, width, well, 0.5, 0.0);
         let column = |x: usize| (0..height).map(|y| charge[y * width + x]).sum::<u32>();
         assert_eq!([column(3), column(4), column(5)], [250, 600, 250]);
-        // Where all are full, everything leaves.
+        // If every pixel is full, all excess charge leaves the frame.
         for (anti_blooming, drained_e) in [(0.0, 0), (1.0, 50 * 990)] {
             let mut charge = vec![1000; 50];
             let spill = spread(&mut charge, 5, 10, 0.9, anti_blooming);

@@ -1,4 +1,4 @@
-//! The camera as its pixels see it, a row at a time.
+//! The signal chain of the camera, one row at a time.
 
 use portable_numerics::elementary::exp_f32;
 use portable_numerics::random::SplitMix64;
@@ -6,7 +6,7 @@ use portable_numerics::random::SplitMix64;
 use crate::exposure::SaturatedRun;
 use crate::field::{blocks, padded};
 use crate::hash::{BLOCK, Block, RowWords, Stream};
-use crate::poisson::{at_least_nothing, poisson};
+use crate::poisson::{clamp_to_zero, poisson};
 use crate::{CameraParams, PhotonNoise, ReadNoise};
 
 #[derive(Debug, Clone, PartialEq)]
@@ -19,19 +19,19 @@ pub(crate) struct Chain {
     dark: f32,
     highest: f32,
     photon_noise: PhotonNoise,
-    /// Where one normal deviate serves for both noises.
+    /// Mean from which one normal deviate stands for both noises.
     normal_from: f32,
     pub(crate) pattern: Option<Pattern>,
 }
 
-/// Where saturated pixels of a row are noted, if anywhere.
+/// Records the saturated pixels of a row, if `runs` is given.
 pub(crate) struct Marker<'a> {
     pub(crate) y: u32,
     pub(crate) runs: Option<&'a mut Vec<SaturatedRun>>,
 }
 
 impl Marker<'_> {
-    /// Notes the pixels of a block at `x` that are not 0, one run for those side by side.
+    /// Records the non-zero pixels of a block at `x`; adjacent pixels form one run.
     #[cold]
     #[inline(never)]
     fn mark(&mut self, x: u32, full: &[u32; BLOCK]) {
@@ -47,7 +47,7 @@ impl Marker<'_> {
 }
 
 impl Chain {
-    #[expect(clippy::cast_possible_truncation, reason = "pixels are single precision")]
+    #[expect(clippy::cast_possible_truncation, reason = "computations per pixel use single precision")]
     pub(crate) fn new(params: &CameraParams) -> Self {
         let read_noise = match params.read_noise {
             ReadNoise::Same { e } => e,
@@ -69,29 +69,30 @@ impl Chain {
         }
     }
 
-    /// y before rounding: K·charge + offset
+    /// Returns y before rounding: K·charge + offset
     #[inline(always)]
     fn level(&self, charge: f32) -> f32 {
         self.gain * charge + self.offset
     }
 
-    /// Mean electrons of a block of pixels, light and dark.
+    /// Returns the mean electrons of a block of pixels, from light and dark current.
     #[inline(always)]
-    fn means(&self, electrons: &[f32; BLOCK], traits: Option<&Traits>) -> [f32; BLOCK] {
+    fn means(&self, electrons: &[f32; BLOCK], pixels: Option<&PixelPattern>) -> [f32; BLOCK] {
         let mut means = *electrons;
         for (i, mean) in means.iter_mut().enumerate() {
-            let light = at_least_nothing(*mean);
-            *mean = traits.map_or(light, |traits| light * traits.response[i]) + self.dark;
+            let light = clamp_to_zero(*mean);
+            *mean = pixels.map_or(light, |pixels| light * pixels.response[i]) + self.dark;
         }
         means
     }
 
-    /// The mean itself, and both noises in the standard deviation, where the mean is large enough.
+    /// Returns the mean, and writes the standard deviation of both noises to `noise`, where the mean is at least
+    /// `normal_from`.
     #[inline(always)]
     fn one_normal(
         &self,
         means: &[f32; BLOCK],
-        traits: Option<&Traits>,
+        pixels: Option<&PixelPattern>,
         noise: &mut [f32; BLOCK],
         shot: &[f32; BLOCK],
         block: &Block<'_>,
@@ -102,7 +103,7 @@ impl Chain {
         }
         let mut charge = if everywhere { *means } else { poisson(means, shot, block) };
         for i in 0..BLOCK {
-            let read = traits.map_or(self.read_noise, |traits| traits.read_noise[i]);
+            let read = pixels.map_or(self.read_noise, |pixels| pixels.read_noise[i]);
             let both = (means[i].min(self.full_well) + read * read).sqrt();
             let normal = means[i] >= self.normal_from;
             noise[i] = if normal { both } else { read };
@@ -111,10 +112,10 @@ impl Chain {
         charge
     }
 
-    /// Puts the grey levels of the block at `x` out, from the charges before and after reading, and returns the number of
-    /// its saturated pixels.
+    /// Writes the grey levels of the block at `x` to `out`, and returns the number of saturated pixels. `before` and
+    /// `after` are the charges before and after read noise.
     #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, reason = "the lowest 16 bits are the level")]
+    #[expect(clippy::cast_possible_truncation, reason = "the lowest 16 bits hold the level")]
     fn convert(
         &self,
         full_well: f32,
@@ -123,7 +124,7 @@ impl Chain {
         out: &mut [u16],
         marker: &mut Marker<'_>,
     ) -> usize {
-        /// Added to an integer below it, it leaves the integer in the lowest bits.
+        /// Adding 2²³ to a smaller integer leaves the integer in the lowest mantissa bits.
         const UNIT: f32 = 8_388_608.0;
         let mut codes = [0; BLOCK];
         let mut full = [0; BLOCK];
@@ -148,17 +149,17 @@ impl Chain {
     }
 }
 
-/// N + d + σ·n, where d is 0 without a fixed pattern.
+/// Returns N + d + σ·n; d is 0 without a fixed pattern.
 #[inline(always)]
 fn with_read_noise(
     charge: &[f32; BLOCK],
     noise: &[f32; BLOCK],
     read: &[f32; BLOCK],
-    traits: Option<&Traits>,
+    pixels: Option<&PixelPattern>,
 ) -> [f32; BLOCK] {
     let mut after = [0.0; BLOCK];
     for i in 0..BLOCK {
-        let offset = traits.map_or(charge[i], |traits| charge[i] + traits.offset[i]);
+        let offset = pixels.map_or(charge[i], |pixels| charge[i] + pixels.offset[i]);
         after[i] = offset + noise[i] * read[i];
     }
     after
@@ -167,12 +168,12 @@ fn with_read_noise(
 #[multiversion::multiversion(targets = "simd")]
 pub(crate) fn mean_row(chain: &Chain, electrons: &[f32], out: &mut [f32]) {
     for (dn, &mean) in out.iter_mut().zip(electrons) {
-        let charge = (at_least_nothing(mean) + chain.dark).min(chain.full_well);
+        let charge = (clamp_to_zero(mean) + chain.dark).min(chain.full_well);
         *dn = chain.level(charge).max(0.0).min(chain.highest);
     }
 }
 
-/// A row of a camera, with a fixed pattern or none.
+/// Exposes a row of pixels, with or without a fixed pattern.
 #[multiversion::multiversion(targets = "simd")]
 pub(crate) fn expose_row(
     chain: &Chain,
@@ -183,7 +184,7 @@ pub(crate) fn expose_row(
     out: &mut [u16],
     marker: &mut Marker<'_>,
 ) -> usize {
-    // Two loops: that of a camera whose pixels are alike has no branches.
+    // Separate instances: the one without a fixed pattern has no branches.
     match pattern {
         None => expose(chain, row, None, x, electrons, out, marker),
         Some(pattern) => expose(chain, row, Some(pattern), x, electrons, out, marker),
@@ -203,28 +204,28 @@ fn expose(
     let mut saturated = 0;
     let both = electrons.chunks(BLOCK).zip(out.chunks_mut(BLOCK));
     for (x, (electrons, out)) in blocks(x).zip(both) {
-        // Whole blocks are copied at once, which is what `first_chunk` is for; only the last of a row is not.
+        // `first_chunk` copies full blocks; only the last block of a row needs padding.
         let electrons = electrons.first_chunk().copied().unwrap_or_else(|| padded(electrons));
-        let (block, traits) = (row.block(x), pattern.map(|pattern| pattern.block(x)));
-        let (traits, [shot, read]) = (traits.as_ref(), block.normal_pairs());
-        let means = chain.means(&electrons, traits);
+        let (block, pixels) = (row.block(x), pattern.map(|pattern| pattern.block(x)));
+        let (pixels, [shot, read]) = (pixels.as_ref(), block.normal_pairs());
+        let means = chain.means(&electrons, pixels);
         // g_po and the standard deviation of g_g of Eq. 13
-        let mut noise = traits.map_or([chain.read_noise; BLOCK], |traits| traits.read_noise);
+        let mut noise = pixels.map_or([chain.read_noise; BLOCK], |pixels| pixels.read_noise);
         let mut charge = match chain.photon_noise {
             PhotonNoise::Exact => poisson(&means, &shot, &block),
             PhotonNoise::Off => means,
-            PhotonNoise::NormalAbove { .. } => chain.one_normal(&means, traits, &mut noise, &shot, &block),
+            PhotonNoise::NormalAbove { .. } => chain.one_normal(&means, pixels, &mut noise, &shot, &block),
         };
         for charge in &mut charge {
             *charge = charge.min(chain.full_well);
         }
-        let after = with_read_noise(&charge, &noise, &read, traits);
+        let after = with_read_noise(&charge, &noise, &read, pixels);
         saturated += chain.convert(chain.full_well, [&charge, &after], x, out, marker);
     }
     saturated
 }
 
-/// The whole electrons that a row gathers, as if pixels had room for them.
+/// Writes the whole electrons collected by a row to `charge`, without the limit of the full well.
 #[multiversion::multiversion(targets = "simd")]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts from 0 to 2²⁵")]
 pub(crate) fn gather_row(
@@ -236,24 +237,24 @@ pub(crate) fn gather_row(
 ) {
     let both = electrons.chunks(BLOCK).zip(charge.chunks_mut(BLOCK));
     for (x, (electrons, charge)) in blocks(0).zip(both) {
-        let (block, traits) = (row.block(x), pattern.map(|pattern| pattern.block(x)));
-        let means = chain.means(&padded(electrons), traits.as_ref());
+        let (block, pixels) = (row.block(x), pattern.map(|pattern| pattern.block(x)));
+        let means = chain.means(&padded(electrons), pixels.as_ref());
         let [shot, _] = block.normal_pairs();
-        let mut gathered =
+        let mut collected =
             if chain.photon_noise == PhotonNoise::Off { means.map(f32::round) } else { poisson(&means, &shot, &block) };
         if let PhotonNoise::NormalAbove { .. } = chain.photon_noise {
             for i in 0..BLOCK {
                 let normal = (means[i] + means[i].sqrt() * shot[i]).round().max(0.0);
-                gathered[i] = if means[i] >= chain.normal_from { normal } else { gathered[i] };
+                collected[i] = if means[i] >= chain.normal_from { normal } else { collected[i] };
             }
         }
-        for (charge, gathered) in charge.iter_mut().zip(gathered) {
-            *charge = gathered as u32;
+        for (charge, collected) in charge.iter_mut().zip(collected) {
+            *charge = collected as u32;
         }
     }
 }
 
-/// A row read out of whole electrons, at most `full_well` of them.
+/// Reads a row of whole electrons; each pixel holds at most `full_well`.
 #[multiversion::multiversion(targets = "simd")]
 pub(crate) fn read_row(
     chain: &Chain,
@@ -266,51 +267,51 @@ pub(crate) fn read_row(
 ) -> usize {
     let mut saturated = 0;
     for (x, (charge, out)) in blocks(0).zip(charge.chunks(BLOCK).zip(out.chunks_mut(BLOCK))) {
-        let traits = pattern.map(|pattern| pattern.block(x));
-        let noise = traits.as_ref().map_or([chain.read_noise; BLOCK], |traits| traits.read_noise);
+        let pixels = pattern.map(|pattern| pattern.block(x));
+        let noise = pixels.as_ref().map_or([chain.read_noise; BLOCK], |pixels| pixels.read_noise);
         let [_, read] = row.block(x).normal_pairs();
         let mut before = [0.0; BLOCK];
         for (before, &charge) in before.iter_mut().zip(charge) {
             *before = charge as f32;
         }
-        let after = with_read_noise(&before, &noise, &read, traits.as_ref());
+        let after = with_read_noise(&before, &noise, &read, pixels.as_ref());
         saturated += chain.convert(full_well as f32, [&before, &after], x, out, marker);
     }
     saturated
 }
 
-/// The fixed pattern of a camera, a pure function of its serial number and the place.
+/// The fixed pattern of a camera: a pure function of its serial number and the pixel position.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Pattern {
     key: u64,
     prnu: f32,
     dsnu: f32,
     read_noise: f32,
-    /// Standard deviation of the logarithm of the read noise.
+    /// Standard deviation of the natural logarithm of the read noise.
     spread: f32,
 }
 
-/// The pattern of one row.
+/// The fixed pattern of one row.
 pub(crate) struct PatternRow<'a> {
     pattern: &'a Pattern,
     words: RowWords,
 }
 
-/// The pattern of a block of pixels.
-struct Traits {
-    /// Response to light, 1 on average.
+/// The fixed pattern of a block of pixels.
+struct PixelPattern {
+    /// Relative response to light, mean 1.
     response: [f32; BLOCK],
-    /// Offset in electrons, 0 on average.
+    /// Offset in electrons, mean 0.
     offset: [f32; BLOCK],
-    /// Standard deviation of the read noise in electrons.
+    /// Standard deviation of the read noise, in electrons.
     read_noise: [f32; BLOCK],
 }
 
 impl Pattern {
-    /// The pattern of these parameters, whose read noise is `read_noise` at the median, or none if all pixels are alike.
-    #[expect(clippy::cast_possible_truncation, reason = "pixels are single precision")]
+    /// Returns the fixed pattern, or `None` if all pixels are equal. `read_noise` is the median in electrons.
+    #[expect(clippy::cast_possible_truncation, reason = "computations per pixel use single precision")]
     fn new(params: &CameraParams, read_noise: f32) -> Option<Self> {
-        /// Sets serial numbers apart from the keys of frames, which may be the same numbers.
+        /// Separates serial numbers from frame keys of the same value.
         const CAMERAS: u64 = 0xca_3e7a_0000_1288;
         let spread = params.read_noise.spread() as f32;
         let uneven = params.prnu > 0.0 || params.dsnu_e > 0.0 || spread > 0.0;
@@ -329,9 +330,9 @@ impl Pattern {
 }
 
 impl PatternRow<'_> {
-    /// The pixels from `x` on.
+    /// Returns the fixed pattern of the block at `x`.
     #[inline(always)]
-    fn block(&self, x: u32) -> Traits {
+    fn block(&self, x: u32) -> PixelPattern {
         let Pattern { prnu, dsnu, read_noise, spread, .. } = *self.pattern;
         let block = self.words.block(x);
         let [mut response, mut offset] = block.normal_pairs();
@@ -346,6 +347,6 @@ impl PatternRow<'_> {
                 noise[i] = read_noise * exp_f32(spread * normal[i]);
             }
         }
-        Traits { response, offset, read_noise: noise }
+        PixelPattern { response, offset, read_noise: noise }
     }
 }

@@ -2,78 +2,78 @@ use core::ops::RangeInclusive;
 
 use thiserror::Error;
 
-/// Why parameters or frames were refused.
+/// Error of invalid parameters or unusable frames.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// One number lies outside the range its field allows.
+    /// A number is out of range.
     #[error("{field} is {value}; it must be {accepted}")]
     OutOfRange {
-        /// Path of the field, as in `photon_noise.mean_e`.
+        /// Path of the field, such as `photon_noise.mean_e`.
         field: &'static str,
-        /// What it held.
+        /// The rejected value.
         value: f64,
-        /// What would be accepted.
+        /// Description of the accepted values.
         accepted: &'static str,
     },
-    /// There is too little to measure on.
-    #[error("{found} {what}; {needed} or more are needed")]
+    /// Too few frames or levels to measure.
+    #[error("too few {what}: {found}, expected at least {needed}")]
     TooFew {
-        /// Of what.
+        /// Plural noun of the counted items.
         what: &'static str,
-        /// How many there are.
+        /// Number of items found.
         found: usize,
-        /// How many would do.
+        /// Number of items required.
         needed: usize,
     },
     /// Frames differ in size.
     #[error(
-        "a frame has {} x {} pixels ({pixels} in all); the frames before it have {} x {}",
+        "a frame has {} x {} pixels ({pixels} in total), but the previous frames have {} x {}",
         found[0], found[1], expected[0], expected[1]
     )]
     Size {
         /// Width and height of the first frame.
         expected: [usize; 2],
-        /// Width, and whole rows of it.
+        /// Width and number of complete rows of this frame.
         found: [usize; 2],
-        /// How many pixels it has.
+        /// Number of pixels of this frame.
         pixels: usize,
     },
-    /// There is no level without light.
-    #[error("no dark frames; two or more, taken with the shutter closed, are needed")]
+    /// No dark frames were added.
+    #[error("no dark frames: add at least two, taken with the shutter closed")]
     NoDark,
-    /// No flat is usable.
+    /// All flats are saturated.
     #[error(
-        "all {levels} levels of flats are saturated: more than 0.2 % of their pixels are at {highest}, the highest \
-         level; take some in less light"
+        "all levels of flats are saturated ({levels} in total): more than 0.2 % of the pixels are at {highest}, the \
+         highest grey level; take flats with less light"
     )]
     Saturated {
-        /// How many levels there are.
+        /// Number of levels.
         levels: usize,
-        /// The highest grey level.
+        /// Highest grey level.
         highest: u16,
     },
-    /// The dark frames' noise is lost.
+    /// Dark frames are clipped at 0.
     #[error(
-        "{:.1} % of the dark frames' pixels are at 0; at most 0.5 % may be: raise the offset of the camera",
-        100.0 * share
+            "{:.1} % of the dark frames' pixels are at 0, expected at most 0.5 %: raise the offset of the camera",
+            100.0 * fraction
     )]
-    CutOff {
-        /// The share of pixels at 0.
-        share: f64,
+    DarkClipped {
+        /// Fraction of pixels at 0.
+        fraction: f64,
     },
-    /// The levels say nothing about the gain.
+    /// The gain cannot be determined.
     #[error(
-        "the levels are all alike: neither mean nor variance rises with light (the brightest flat in use is \
-         {above_dark_dn:.1} grey levels above the dark)"
+        "mean and variance do not increase with light (the brightest unsaturated flat is {above_dark_dn:.1} grey \
+             levels above dark)"
     )]
-    Alike {
-        /// Mean of the brightest flat in use, above that of the dark, in grey levels.
+    NoResponse {
+        /// Mean of the brightest unsaturated flat minus the mean dark level, in grey levels.
         above_dark_dn: f64,
     },
 }
 
-/// `value`, if it lies in a range.
+/// Returns `value` if it is in `range`.
 pub(crate) fn within(
     field: &'static str,
     value: f64,
@@ -83,7 +83,7 @@ pub(crate) fn within(
     require(field, value, range.contains(&value), accepted)
 }
 
-/// `value`, if it is finite and `holds`.
+/// Returns `value` if it is finite and `holds` is true.
 pub(crate) fn require(field: &'static str, value: f64, holds: bool, accepted: &'static str) -> Result<f64, Error> {
     if value.is_finite() && holds { Ok(value) } else { Err(Error::OutOfRange { field, value, accepted }) }
 }

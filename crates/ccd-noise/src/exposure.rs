@@ -1,21 +1,21 @@
-/// Pixels side by side that are saturated: full, or their converter at its highest level.
+/// A horizontal run of saturated pixels: pixels at full-well capacity or at the highest grey level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct SaturatedRun {
-    /// The row of the frame.
+    /// Row in the frame.
     pub y: u32,
-    /// The first of them.
+    /// Column of the first pixel.
     pub x0: u32,
-    /// The first after them.
+    /// Column after the last pixel.
     pub x1: u32,
 }
 
-/// What became of a whole frame.
+/// Charge statistics of an exposed frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Exposure {
-    /// Saturated pixels: full, or their converter at its highest level.
+    /// Number of saturated pixels: pixels at full-well capacity or at the highest grey level.
     pub saturated: usize,
-    /// Electrons that the anti-blooming drains took. 0 where blooming is off: what is clipped then is not counted.
+    /// Electrons removed by anti-blooming drains. 0 without blooming: excess charge is then not counted.
     pub drained_e: u64,
-    /// Electrons that bloomed over the border of the frame.
+    /// Electrons that bloomed across the border of the frame.
     pub escaped_e: u64,
 }

@@ -1,15 +1,15 @@
 use crate::hash::{BLOCK, BLOCK_STEP, RowWords};
 use crate::poisson::poisson;
 
-/// Noise that is a pure function of a key and of the position in the frame: the pixels of a
-/// frame may be asked for in any order, by rows, tiles or threads, and are always the same.
+/// A noise field: a pure function of a key and of the pixel position. Rows, tiles and threads in any order give the
+/// same values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct NoiseField {
     key: u64,
 }
 
 impl NoiseField {
-    /// The field of this key. Fields of different keys are independent.
+    /// Creates the field of a key. Fields of different keys are independent.
     #[must_use]
     pub fn new(key: u64) -> Self {
         Self { key }
@@ -19,33 +19,32 @@ impl NoiseField {
         RowWords::new(self.key, y)
     }
 
-    /// Standard normal deviates for the window of rows of `width` pixels whose first pixel lies
-    /// at `origin` [x, y] of the frame.
+    /// Writes standard normal deviates to `out`, a window in rows of `width` pixels. `origin` [x, y] is the position of
+    /// its first pixel in the frame.
     ///
-    /// They reach 6.76 standard deviations, in steps of 32 bits of the radius and the angle of pairs of them.
+    /// Box–Muller pairs with 32 bits of radius and 32 bits of angle; the largest absolute value is 6.76.
     ///
     /// # Panics
     ///
-    /// If `out` is not whole rows of `width`.
+    /// If the length of `out` is not a multiple of `width`.
     pub fn normal_into(&self, width: usize, origin: [u32; 2], out: &mut [f32]) {
-        whole_rows(out.len(), width);
+        assert_rows(out.len(), width);
         for (y, out) in rows(origin).zip(out.chunks_exact_mut(width)) {
             normal_row(&self.row(y), origin[0], out);
         }
     }
 
-    /// Poisson deviates of the given `means`, >= 0, for the window of rows of `width` pixels whose
-    /// first pixel lies at `origin` [x, y] of the frame.
+    /// Writes Poisson deviates of `means` to `out`, a window in rows of `width` pixels. `origin` [x, y] is the position
+    /// of its first pixel in the frame.
     ///
-    /// They are exact at every mean up to 2²⁴; larger means count as that, and what is not above 0
-    /// as 0.
+    /// The distribution is exact for means up to 2²⁴. Larger means count as 2²⁴; negative means and NaN count as 0.
     ///
     /// # Panics
     ///
-    /// If `means` is not whole rows of `width`, or `out` not as long as it.
+    /// If the length of `means` is not a multiple of `width`, or differs from the length of `out`.
     pub fn poisson_into(&self, means: &[f32], width: usize, origin: [u32; 2], out: &mut [f32]) {
-        whole_rows(means.len(), width);
-        assert_eq!(out.len(), means.len(), "out has the wrong number of pixels");
+        assert_rows(means.len(), width);
+        assert_eq!(out.len(), means.len(), "`out` and `means` must have the same length");
         let both = means.chunks_exact(width).zip(out.chunks_exact_mut(width));
         for (y, (means, out)) in rows(origin).zip(both) {
             poisson_row(&self.row(y), origin[0], means, out);
@@ -53,16 +52,16 @@ impl NoiseField {
     }
 }
 
-/// The rows of the frame from that of `origin` on.
+/// Iterates over the rows of the frame from `origin` on.
 pub(crate) fn rows(origin: [u32; 2]) -> impl Iterator<Item = u32> {
     (0..).map(move |i| origin[1].wrapping_add(i))
 }
 
-pub(crate) fn whole_rows(len: usize, width: usize) {
-    assert!(width > 0 && len.is_multiple_of(width), "{len} pixels are not whole rows of {width}",);
+pub(crate) fn assert_rows(len: usize, width: usize) {
+    assert!(width > 0 && len.is_multiple_of(width), "{len} pixels are not a multiple of the width, {width}",);
 }
 
-/// The positions of the blocks of a row that starts at `x`.
+/// Iterates over the positions of blocks in a row that starts at `x`.
 pub(crate) fn blocks(x: u32) -> impl Iterator<Item = u32> {
     (0..).map(move |i: u32| x.wrapping_add(i.wrapping_mul(BLOCK_STEP)))
 }
@@ -85,7 +84,7 @@ fn poisson_row(row: &RowWords, x: u32, means: &[f32], out: &mut [f32]) {
     }
 }
 
-/// The end of a row, made up to a whole block.
+/// Pads the last values of a row with zeros to a full block.
 #[inline(always)]
 pub(crate) fn padded(values: &[f32]) -> [f32; BLOCK] {
     let mut block = [0.0; BLOCK];

@@ -2,28 +2,28 @@
 
 use portable_numerics::random::{Rng, SplitMix64, normals_of_words};
 
-/// Pixels that are worked on together: enough to fill the widest vector registers several times.
+/// Pixels per block: enough to fill the widest vector registers several times.
 pub(crate) const BLOCK: usize = BLOCK_STEP as usize;
 
-/// The same as a distance between positions.
+/// `BLOCK` as a distance between positions.
 pub(crate) const BLOCK_STEP: u32 = 64;
 
-/// 2³² / golden ratio: spreads neighbours over all bits.
+/// 2³² / golden ratio: distributes neighbouring positions over all bits.
 const SPREAD: u32 = 0x9e37_79b9;
 
-/// What a word is for.
+/// Purpose of a random word.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Stream {
-    /// Of the pair of normal deviates, one for the photons and one for reading.
+    /// Radius and angle of the pair of normal deviates: one for shot noise, one for read noise.
     Radius,
     Angle,
-    /// What decides whether a proposed count is kept.
+    /// Acceptance test of a proposed count.
     Chance,
-    /// Further bits of the same, where counts are summed up to it.
+    /// Further bits of `Chance`, for counts drawn by inversion.
     Fine,
 }
 
-/// The words of one row of a field.
+/// The random words of one row of a field.
 #[derive(Debug, Clone)]
 pub(crate) struct RowWords {
     start: u32,
@@ -40,9 +40,9 @@ impl RowWords {
         Self { start: a as u32, streams, rare: words.next_u64() }
     }
 
-    /// The pixels from `x` on, hashed once for all streams.
+    /// Returns the block of pixels that starts at `x`; positions are hashed once for all streams.
     #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, reason = "an index below the block's length")]
+    #[expect(clippy::cast_possible_truncation, reason = "less than the block length")]
     pub(crate) fn block(&self, x: u32) -> Block<'_> {
         let mut places = [0; BLOCK];
         for (i, place) in places.iter_mut().enumerate() {
@@ -53,7 +53,7 @@ impl RowWords {
     }
 }
 
-/// The words of a block of pixels of one row.
+/// The random words of a block of pixels in one row.
 pub(crate) struct Block<'a> {
     row: &'a RowWords,
     x: u32,
@@ -61,7 +61,7 @@ pub(crate) struct Block<'a> {
 }
 
 impl Block<'_> {
-    /// One word for each pixel, from one of the streams.
+    /// Returns one word per pixel from a stream.
     #[inline(always)]
     pub(crate) fn words(&self, stream: Stream) -> [u32; BLOCK] {
         let salt = self.row.streams[stream as usize];
@@ -72,28 +72,28 @@ impl Block<'_> {
         words
     }
 
-    /// Two standard normal deviates for each pixel: one for the photons, one for reading.
+    /// Returns two standard normal deviates per pixel: one for shot noise, one for read noise.
     #[inline(always)]
     pub(crate) fn normal_pairs(&self) -> [[f32; BLOCK]; 2] {
         self.normal_pairs_of(Stream::Radius, Stream::Angle)
     }
 
-    /// Two standard normal deviates for each pixel, from any two streams.
+    /// Returns two standard normal deviates per pixel, from any two streams.
     #[inline(always)]
     pub(crate) fn normal_pairs_of(&self, radii: Stream, angles: Stream) -> [[f32; BLOCK]; 2] {
         normals_of_words(&self.words(radii), &self.words(angles))
     }
 
-    /// As many further words as wanted for one pixel.
-    #[expect(clippy::cast_possible_truncation, reason = "an index below the block's length")]
+    /// Returns a generator of further words for one pixel.
+    #[expect(clippy::cast_possible_truncation, reason = "less than the block length")]
     pub(crate) fn rare(&self, i: usize) -> SplitMix64 {
         let x = self.x.wrapping_add(i as u32);
         SplitMix64::new(SplitMix64::word(self.row.rare ^ u64::from(x), 0))
     }
 }
 
-/// A bijection of 32 bits in which each input bit flips each output bit with a probability close
-/// to one half (found by C. Wellons' search, bias 0.11).
+/// A bijection on 32 bits: each input bit flips each output bit with a probability near one half (from C. Wellons'
+/// search, bias 0.11).
 #[inline(always)]
 fn mix(mut x: u32) -> u32 {
     x = (x ^ (x >> 16)).wrapping_mul(0x21f0_aaad);
@@ -105,9 +105,9 @@ fn mix(mut x: u32) -> u32 {
 mod tests {
     use super::*;
 
-    /// Each bit of a place, a row or a key flips each bit of each word half of the time.
+    /// Each bit of a position, a row or a key flips each bit of each word half of the time.
     #[test]
-    fn every_bit_moves_every_bit() {
+    fn every_input_bit_changes_every_output_bit() {
         let word = |key: u64, y: u32, x: u32, s: Stream| RowWords::new(key, y).block(x).words(s)[0];
         let small = |words: &mut SplitMix64| u32::try_from(words.next_u64() >> 48).unwrap();
         let samples = 4000;
@@ -130,7 +130,7 @@ mod tests {
                     }
                 }
                 for flips in flips.iter().flatten() {
-                    // 2688 counts are compared: five standard errors.
+                    // 2688 counts are compared, therefore five standard errors.
                     let z = (f64::from(*flips) - f64::from(samples) / 2.0) / (f64::from(samples) / 4.0).sqrt();
                     assert!(z.abs() < 5.0, "{stream:?}, bit {bit}: {z}");
                 }

@@ -1,51 +1,51 @@
-//! What JPEG compression takes from an image, without its entropy coding, which takes nothing.
+//! Lossy steps of JPEG compression, without the lossless entropy coding.
 
 use crate::error::{Error, require, within};
-use crate::field::whole_rows;
+use crate::field::assert_rows;
 
-/// How far the two colour differences are thinned out before they are compressed.
+/// Chroma subsampling.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Subsampling {
-    /// Not at all: 4:4:4.
-    Full,
-    /// Two columns become one: 4:2:2.
-    Columns,
-    /// Squares of four pixels become one: 4:2:0, what most encoders do.
+    /// 4:4:4: no subsampling.
+    S444,
+    /// 4:2:2: two columns share one chroma sample.
+    S422,
+    /// 4:2:0: squares of four pixels share one chroma sample. Most encoders use it.
     #[default]
-    Squares,
+    S420,
 }
 
-/// JPEG compression as the last step.
+/// Parameters of JPEG compression.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct JpegParams {
-    /// Quality as the encoders of the Independent JPEG Group count it, 1 to 100. Default 90, ours.
+    /// Quality, on the scale of the Independent JPEG Group's encoder, 1 to 100. Default 90, ours.
     pub quality: u32,
-    /// Colour subsampling. Default 4:2:0, that of most encoders; grey images have none.
+    /// Chroma subsampling of colour images. Default 4:2:0, as in most encoders. Grey images have no chroma.
     pub subsampling: Subsampling,
-    /// Bits of the image's levels. Default 8, all that baseline JPEG has.
+    /// Bit depth of the image. Default 8, the only one of baseline JPEG.
     pub bit_depth: u32,
 }
 
 impl Default for JpegParams {
     fn default() -> Self {
-        Self { quality: 90, subsampling: Subsampling::Squares, bit_depth: 8 }
+        Self { quality: 90, subsampling: Subsampling::S420, bit_depth: 8 }
     }
 }
 
-/// An 8 x 8 block, row after row.
+/// An 8 x 8 block of rows.
 type Block = [[i32; SIDE]; SIDE];
 
 const SIDE: usize = 8;
 
-/// Compresses and decompresses images in place: colour differences, 8 x 8 cosine transforms and rounding by the tables
-/// of ITU-T T.81, Annex K, scaled by the quality.
+/// Compresses and decompresses images in place: chroma subsampling, 8 x 8 cosine transforms and quantisation with the
+/// tables of ITU-T T.81, Annex K, scaled by the quality.
 ///
-/// The arithmetic is of integers, to the digits that the Independent JPEG Group's library keeps, so that images are what
-/// programs with that library save and load again, to the last bit. What a last block has too many is filled with its last
-/// pixels, as there.
+/// The integer arithmetic has the precision of the Independent JPEG Group's library. Images equal those that programs
+/// with this library save and load, to the last bit. Incomplete blocks are padded with the last pixels, as in the
+/// library.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Jpeg {
-    /// The steps of the coefficients.
+    /// Quantisation steps of the coefficients.
     luma: Block,
     chroma: Block,
     subsampling: Subsampling,
@@ -65,8 +65,9 @@ const CHROMA: [u32; 64] = [
     99, 99, 99, 99, 99, 99,
 ];
 
-/// Row u is √2·cos((2x + 1)·u·π/16), of row 0 cos 0, in units of 2⁻¹³. The last digits are those of sums of the rounded
-/// constants of Loeffler, Ligtenberg and Moschytz's transform (doi:10.1109/ICASSP.1989.266596), as the library adds them.
+/// Row u is √2·cos((2x + 1)·u·π/16), row 0 is cos 0, in units of 2⁻¹³. The last digits are those of sums of the rounded
+/// constants of Loeffler, Ligtenberg and Moschytz's transform (doi:10.1109/ICASSP.1989.266596), in the library's order
+/// of addition.
 const COSINES: Block = [
     [8192, 8192, 8192, 8192, 8192, 8192, 8192, 8192],
     [11_363, 9633, 6437, 2260, -2260, -6437, -9633, -11_363],
@@ -88,42 +89,43 @@ const TRANSPOSED: Block = {
     transposed
 };
 
-/// Binary digits of the cosines, and those kept between the two passes of a transform. Each pass is too large by √8.
+/// Binary digits of the cosines, and digits kept between the two passes of a transform. Each pass scales by √8.
 const COSINE_DIGITS: u32 = 13;
 const KEPT_DIGITS: u32 = 2;
 const NORM_DIGITS: u32 = 3;
 
-/// The middle of 8 bits.
+/// The centre of the 8-bit range.
 const MIDDLE: i32 = 128;
 
 impl Jpeg {
-    /// Checks the parameters and scales the tables.
+    /// Creates a compressor: validates the parameters and scales the tables.
     ///
     /// # Errors
     ///
-    /// If the quality lies outside its range, or the bit depth is not 8.
+    /// If the quality is out of range, or the bit depth is not 8.
     pub fn new(params: &JpegParams) -> Result<Self, Error> {
         let JpegParams { quality, subsampling, bit_depth } = *params;
         within("quality", quality.into(), 1.0..=100.0, "from 1 to 100")?;
-        require("bit_depth", f64::from(bit_depth), bit_depth == 8, "8, all that baseline JPEG has")?;
+        require("bit_depth", f64::from(bit_depth), bit_depth == 8, "8, the bit depth of baseline JPEG")?;
         Ok(Self { luma: steps(&LUMA, quality), chroma: steps(&CHROMA, quality), subsampling })
     }
 
-    /// A grey image of 8 bits, in rows of `width` pixels.
+    /// Compresses and decompresses an 8-bit grey image in place, in rows of `width` pixels.
     ///
     /// # Panics
     ///
-    /// If `grey` is not whole rows of `width`.
+    /// If the length of `grey` is not a multiple of `width`.
     pub fn grey(&self, grey: &mut [u8], width: usize) {
-        whole_rows(grey.len(), width);
+        assert_rows(grey.len(), width);
         compress(&self.luma, grey, width);
     }
 
-    /// A frame of a camera of 8 bits, in rows of `width` pixels. What is above 255 counts as 255.
+    /// Compresses and decompresses a frame of an 8-bit camera in place, in rows of `width` pixels. Values above 255
+    /// count as 255.
     ///
     /// # Panics
     ///
-    /// If `frame` is not whole rows of `width`.
+    /// If the length of `frame` is not a multiple of `width`.
     pub fn frame(&self, frame: &mut [u16], width: usize) {
         let mut grey: Vec<u8> = frame.iter().map(|&dn| dn.min(255) as u8).collect();
         self.grey(&mut grey, width);
@@ -132,13 +134,13 @@ impl Jpeg {
         }
     }
 
-    /// A colour image of 8 bits: red, green and blue of each pixel side by side, in rows of `width` pixels.
+    /// Compresses and decompresses an 8-bit RGB image in place: interleaved channels, in rows of `width` pixels.
     ///
     /// # Panics
     ///
-    /// If `rgb` is not whole rows of `width` pixels.
+    /// If the length of `rgb` is not a multiple of 3 · `width`.
     pub fn rgb(&self, rgb: &mut [u8], width: usize) {
-        whole_rows(rgb.len(), 3 * width);
+        assert_rows(rgb.len(), 3 * width);
         let [mut luma, mut blue, mut red] = [(); 3].map(|()| vec![0; rgb.len() / 3]);
         split(rgb, &mut luma, &mut blue, &mut red);
         compress(&self.luma, &mut luma, width);
@@ -146,18 +148,18 @@ impl Jpeg {
         join(&luma, &blue, &red, rgb);
     }
 
-    /// A plane of colour differences, thinned out for compression.
+    /// Subsamples, compresses and restores a chroma plane.
     fn difference(&self, mut plane: Vec<u8>, width: usize) -> Vec<u8> {
         let [across, down] = match self.subsampling {
-            Subsampling::Full => {
+            Subsampling::S444 => {
                 compress(&self.chroma, &mut plane, width);
                 return plane;
             }
-            Subsampling::Columns => [2, 1],
-            Subsampling::Squares => [2, 2],
+            Subsampling::S422 => [2, 1],
+            Subsampling::S420 => [2, 2],
         };
         let height = plane.len() / width;
-        // The columns to the right of the image are those of its last pixels; the rows below it those of the last thinned.
+        // Padding columns repeat the last pixel of the image; padding rows repeat the last subsampled row.
         let thin_width = width.div_ceil(across).next_multiple_of(SIDE);
         let thin_height = height.div_ceil(down);
         let mut thin = Vec::with_capacity(thin_width * thin_height);
@@ -166,13 +168,13 @@ impl Jpeg {
             for x in 0..thin_width {
                 let columns = [2 * x, 2 * x + 1].map(|x| x.min(width - 1));
                 let sum: u16 = rows.iter().flat_map(|row| columns.map(|x| u16::from(row[x]))).sum();
-                // Halves go up and down in turn.
+                // Halves round up and down alternately.
                 let turn = if down == 1 { 2 * odd(x) } else { 1 + odd(x) };
                 thin.push(narrow((i32::from(sum) + turn) >> 2));
             }
         }
         compress(&self.chroma, &mut thin, thin_width);
-        // Between the samples: three parts of the nearest and one of the next nearest, along either axis.
+        // Interpolates between samples: 3/4 of the nearest and 1/4 of the next nearest, along each axis.
         let columns = width.div_ceil(across);
         let row = |y: usize| &thin[y.min(thin_height - 1) * thin_width..][..columns];
         for (y, out) in plane.chunks_exact_mut(width).enumerate() {
@@ -186,7 +188,7 @@ impl Jpeg {
             for (x, out) in out.iter_mut().enumerate() {
                 let here = x / 2;
                 let next = if x % 2 == 0 { here.saturating_sub(1) } else { (here + 1).min(columns - 1) };
-                // Halves go up and down in turn.
+                // Halves round up and down alternately.
                 let half = if down == 1 { 4 + 4 * odd(x) } else { 8 - odd(x) };
                 *out = narrow((3 * column(here) + column(next) + half) >> 4);
             }
@@ -195,14 +197,14 @@ impl Jpeg {
     }
 }
 
-/// The steps of the coefficients.
+/// Returns the quantisation steps of the coefficients.
 fn steps(annex: &[u32; 64], quality: u32) -> Block {
     let scale = if quality < 50 { 5000 / quality } else { 200 - 2 * quality };
     let step = |i: usize| ((annex[i] * scale + 50) / 100).clamp(1, 255).cast_signed();
     core::array::from_fn(|u| core::array::from_fn(|v| step(SIDE * u + v)))
 }
 
-/// There, rounded, and back.
+/// Transforms a block, quantises its coefficients and transforms back.
 #[inline(always)]
 fn round(steps: &Block, block: &Block) -> Block {
     let rows = product(block, &TRANSPOSED, COSINE_DIGITS - KEPT_DIGITS);
@@ -216,8 +218,8 @@ fn round(steps: &Block, block: &Block) -> Block {
     product(&columns, &COSINES, COSINE_DIGITS + KEPT_DIGITS + NORM_DIGITS)
 }
 
-/// The integer nearest to a / b, halves away from 0. Single precision is exact enough for integers below 2¹⁶, and it divides
-/// side by side.
+/// Returns the integer nearest to a / b; halves round away from 0. Single precision is exact for integers below 2¹⁶,
+/// and its division vectorises.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "below 2¹⁶")]
 fn nearest(a: i32, b: i32) -> i32 {
@@ -225,7 +227,7 @@ fn nearest(a: i32, b: i32) -> i32 {
     if a < 0 { -(level as i32) } else { level as i32 }
 }
 
-/// a·b without the last `digits`, rounded.
+/// Returns the matrix product a·b without its last `digits` binary digits, rounded.
 #[inline(always)]
 fn product(a: &Block, b: &Block, digits: u32) -> Block {
     let mut out = [[1 << (digits - 1); SIDE]; SIDE];
@@ -270,7 +272,7 @@ fn compress(steps: &Block, plane: &mut [u8], width: usize) {
 const DIGITS: u32 = 16;
 const HALF: i32 = 1 << (DIGITS - 1);
 
-/// To Y, C_b and C_r.
+/// Converts RGB to Y, C_b and C_r.
 #[multiversion::multiversion(targets = "simd")]
 fn split(rgb: &[u8], luma: &mut [u8], blue: &mut [u8], red: &mut [u8]) {
     let difference = |sum: i32| narrow((sum + (MIDDLE << DIGITS) + HALF - 1) >> DIGITS);
@@ -283,7 +285,7 @@ fn split(rgb: &[u8], luma: &mut [u8], blue: &mut [u8], red: &mut [u8]) {
     }
 }
 
-/// And back.
+/// Converts Y, C_b and C_r to RGB.
 #[multiversion::multiversion(targets = "simd")]
 fn join(luma: &[u8], blue: &[u8], red: &[u8], rgb: &mut [u8]) {
     let planes = luma.iter().zip(blue).zip(red);

@@ -1,55 +1,54 @@
-//! Poisson deviates: whole blocks without a branch, and an exact finish for the few that need it.
+//! Exact Poisson deviates: branch-free blocks, and a slow path for the few pixels that need it.
 
 use portable_numerics::elementary::exp_f64;
 use portable_numerics::random::{SplitMix64, open_uniform, open_unit};
 
 use crate::hash::{BLOCK, Block, Stream};
 
-/// Below this mean a deviate is found by summing probabilities, above it from a normal deviate.
-/// Both are exact; here they take about the same time.
-const SUMMED_BELOW: f32 = 20.0;
+/// Means below this use inversion, larger means use a normal proposal. Both are exact and equally fast at this mean.
+const INVERSION_BELOW: f32 = 20.0;
 
-/// Larger means are taken as this one. It is beyond any full well, and counts up to it are exact in
-/// single precision.
+/// Larger means count as this one, 2²⁴. It exceeds any full-well capacity, and counts up to it are exact in single
+/// precision.
 const LARGEST_MEAN: f32 = 16_777_216.0;
 
-/// Counts of probability above 1e-24 at the means that are summed.
-const SUMMED_TERMS: usize = 96;
+/// Number of terms of inversion: the probability of a larger count is below 1e-24.
+const INVERSION_TERMS: usize = 96;
 
-/// One Poisson deviate for each mean, from a normal one. Negative means and those that are no number count as 0.
+/// Returns one Poisson deviate per mean, from normal deviates. Negative means and NaN count as 0.
 #[inline(always)]
 pub(crate) fn poisson(means: &[f32; BLOCK], normals: &[f32; BLOCK], block: &Block<'_>) -> [f32; BLOCK] {
     let chances = block.words(Stream::Chance);
     let mut means = *means;
     for mean in &mut means {
-        *mean = at_least_nothing(*mean).min(LARGEST_MEAN);
+        *mean = clamp_to_zero(*mean).min(LARGEST_MEAN);
     }
     let (least, most) = extremes(&means);
-    if most < SUMMED_BELOW {
-        return summed(&means, &chances, &block.words(Stream::Fine));
+    if most < INVERSION_BELOW {
+        return by_inversion(&means, &chances, &block.words(Stream::Fine));
     }
     let mut counts = from_normals(&means, normals, &chances, block);
-    if least < SUMMED_BELOW {
+    if least < INVERSION_BELOW {
         let mut small = means;
         for mean in &mut small {
-            *mean = if *mean < SUMMED_BELOW { *mean } else { 0.0 };
+            *mean = if *mean < INVERSION_BELOW { *mean } else { 0.0 };
         }
-        let summed = summed(&small, &chances, &block.words(Stream::Fine));
+        let summed = by_inversion(&small, &chances, &block.words(Stream::Fine));
         for i in 0..BLOCK {
-            counts[i] = if means[i] < SUMMED_BELOW { summed[i] } else { counts[i] };
+            counts[i] = if means[i] < INVERSION_BELOW { summed[i] } else { counts[i] };
         }
     }
     counts
 }
 
-/// `mean`, or +0 where it is negative, -0 or no number.
+/// Returns `mean`, or +0 if it is negative, -0 or NaN.
 #[inline(always)]
-pub(crate) fn at_least_nothing(mean: f32) -> f32 {
+pub(crate) fn clamp_to_zero(mean: f32) -> f32 {
     if mean > 0.0 { mean } else { 0.0 }
 }
 
-/// Least and greatest of numbers of positive sign. Their bits are ordered as they are, and the order
-/// in which integers are compared does not matter, so that they are compared side by side.
+/// Returns the smallest and largest of non-negative numbers. Their bit patterns have the same order, and integer
+/// comparison vectorises.
 #[inline(always)]
 fn extremes(means: &[f32; BLOCK]) -> (f32, f32) {
     let (mut least, mut most) = (u32::MAX, 0);
@@ -60,13 +59,12 @@ fn extremes(means: &[f32; BLOCK]) -> (f32, f32) {
     (f32::from_bits(least), f32::from_bits(most))
 }
 
-/// Inversion: the number of partial sums of the distribution that a uniform deviate of 53 bits
-/// exceeds.
+/// Returns deviates by inversion: the number of cumulative probabilities below a uniform deviate.
 #[inline(always)]
-fn summed(means: &[f32; BLOCK], high: &[u32; BLOCK], low: &[u32; BLOCK]) -> [f32; BLOCK] {
+fn by_inversion(means: &[f32; BLOCK], high: &[u32; BLOCK], low: &[u32; BLOCK]) -> [f32; BLOCK] {
     const STEP: f64 = 1.0 / 4_294_967_296.0;
     let mut counts = [0.0; BLOCK];
-    // Fewer at a time than elsewhere: the slowest pixel of them decides.
+    // Smaller groups than elsewhere, because the slowest pixel determines the time of its group.
     const FEW: usize = 16;
     for at in (0..BLOCK).step_by(FEW) {
         let (mut mean, mut uniform, mut term) = ([0.0; FEW], [0.0; FEW], [0.0; FEW]);
@@ -77,7 +75,7 @@ fn summed(means: &[f32; BLOCK], high: &[u32; BLOCK], low: &[u32; BLOCK]) -> [f32
         }
         let mut sum = term;
         let mut count = [0_u64; FEW];
-        for k in 1..SUMMED_TERMS {
+        for k in 1..INVERSION_TERMS {
             let inverse = 1.0 / k as f64;
             let mut exceeding = 0;
             for i in 0..FEW {
@@ -98,9 +96,9 @@ fn summed(means: &[f32; BLOCK], high: &[u32; BLOCK], low: &[u32; BLOCK]) -> [f32
     counts
 }
 
-/// Ahrens and Dieter's PD (doi:10.1145/355993.355997): K = ⌊µ + √µ·z⌋ is a Poisson deviate but for
-/// the lack of skewness. Where K falls short of µ it is given up with a probability of nearly
-/// (µ - K)³/6µ², 0.13/√µ on the whole, for a deviate from what is missing above µ.
+/// Ahrens and Dieter's method PD (doi:10.1145/355993.355997): K = ⌊µ + √µ·z⌋ is a Poisson deviate except for the missing
+/// skewness. A K below µ is rejected with a probability of nearly (µ - K)³/6µ², 0.13/√µ on average, and replaced by a
+/// deviate from the remaining probability above µ.
 #[inline(always)]
 fn from_normals(
     means: &[f32; BLOCK],
@@ -111,42 +109,42 @@ fn from_normals(
     let mut counts = [0.0; BLOCK];
     let mut open = [0_u32; BLOCK];
     for i in 0..BLOCK {
-        let mean = means[i].max(SUMMED_BELOW);
-        // The integer part is kept aside, so that the rest keeps its digits.
+        let mean = means[i].max(INVERSION_BELOW);
+        // The integer part is separated, so that the fraction keeps full precision.
         let whole = mean.floor();
         let part = mean - whole;
         let step = (part + mean.sqrt() * normals[i]).floor();
         counts[i] = whole + step;
         let short = part - step;
-        // The squeeze: certain to be kept, for K >= µ in any case.
-        let kept = short * short * short <= 6.0 * mean * mean * open_unit(chances[i]);
-        open[i] = u32::from(!(kept & (counts[i] >= 0.0)));
+        // Squeeze test: acceptance is certain, always for K >= µ.
+        let accepted = short * short * short <= 6.0 * mean * mean * open_unit(chances[i]);
+        open[i] = u32::from(!(accepted & (counts[i] >= 0.0)));
     }
     for at in (0..BLOCK).step_by(16) {
         if open[at..at + 16].iter().fold(0, |any, o| any | o) == 0 {
             continue;
         }
         for i in at..at + 16 {
-            if open[i] != 0 && means[i] >= SUMMED_BELOW {
-                counts[i] = finish(means[i], counts[i], open_unit(chances[i]), block.rare(i));
+            if open[i] != 0 && means[i] >= INVERSION_BELOW {
+                counts[i] = exact_count(means[i], counts[i], open_unit(chances[i]), block.rare(i));
             }
         }
     }
     counts
 }
 
-/// What the squeeze left open, for one pixel: the quotient test, and if `count` fails it, a deviate
-/// from the excess of the Poisson distribution over that of the proposals.
+/// Returns the deviate of a pixel that the squeeze test did not accept: `count` if it passes the quotient test, otherwise
+/// a deviate from the excess of the Poisson distribution over that of the proposals.
 #[cold]
 #[inline(never)]
-#[expect(clippy::cast_possible_truncation, reason = "counts are exact in single precision")]
-fn finish(mean: f32, count: f32, chance: f32, mut words: SplitMix64) -> f32 {
-    let law = Law::new(mean);
+#[expect(clippy::cast_possible_truncation, reason = "counts below 2²⁴ are exact in single precision")]
+fn exact_count(mean: f32, count: f32, chance: f32, mut words: SplitMix64) -> f32 {
+    let quotient = PoissonQuotient::new(mean);
     let count = f64::from(count);
-    if count >= 0.0 && 1.0 - f64::from(chance) <= law.ratio(count) {
+    if count >= 0.0 && 1.0 - f64::from(chance) <= quotient.ratio(count) {
         return count as f32;
     }
-    // Under a double exponential centred where the excess is greatest.
+    // Rejection from a double exponential distribution centred at the maximum of the excess.
     loop {
         let height = open_uniform(&mut words);
         let side = 2.0 * open_uniform(&mut words) - 1.0;
@@ -155,50 +153,50 @@ fn finish(mean: f32, count: f32, chance: f32, mut words: SplitMix64) -> f32 {
         if t <= EXCESS_START {
             continue;
         }
-        let count = (law.mean + law.root * t).floor();
-        let excess = law.proposed(count) * (law.ratio(count) - 1.0);
-        if side.abs() * EXCESS_BOUND * height <= excess * law.mean {
+        let count = (quotient.mean + quotient.root * t).floor();
+        let excess = quotient.proposed(count) * (quotient.ratio(count) - 1.0);
+        if side.abs() * EXCESS_BOUND * height <= excess * quotient.mean {
             return count as f32;
         }
     }
 }
 
-/// Below this many standard deviations there is no excess, for means of 10 or more.
+/// Lower limit of the excess in standard deviations, for means of at least 10.
 const EXCESS_START: f64 = -0.6744;
-/// Where the excess is greatest, in standard deviations.
+/// Position of the maximum of the excess, in standard deviations.
 const EXCESS_CENTRE: f64 = 1.8;
-/// The greatest value of µ · excess / exp_f64(-|t - centre|).
+/// Maximum of µ · excess / exp(-|t - centre|).
 const EXCESS_BOUND: f64 = 0.1069;
 
-/// The distribution wanted and that of the proposals, for one mean of 10 or more.
-struct Law {
+/// The Poisson distribution and that of the proposals, for a mean of at least 10.
+struct PoissonQuotient {
     mean: f64,
     root: f64,
 }
 
-impl Law {
+impl PoissonQuotient {
     fn new(mean: f32) -> Self {
         let mean = f64::from(mean);
         Self { mean, root: mean.sqrt() }
     }
 
-    /// The probability that ⌊µ + √µ·z⌋ = k for a normal z.
+    /// Returns the probability of ⌊µ + √µ·z⌋ = k for a standard normal z.
     fn proposed(&self, count: f64) -> f64 {
-        let x = self.middle(count);
+        let x = self.centre(count);
         let density = exp_f64(-0.5 * x * x) / (core::f64::consts::TAU * self.mean).sqrt();
         density * self.bin(x)
     }
 
-    /// That of k electrons, µᵏ e⁻µ / k!, divided by that of its proposal.
+    /// Returns the Poisson probability of k, µᵏ e⁻µ / k!, divided by that of its proposal.
     fn ratio(&self, count: f64) -> f64 {
-        let x = self.middle(count);
+        let x = self.centre(count);
         let normal = 0.5 * x * x;
         if count < 10.0 {
             let factorial = (1..=10).map(f64::from).take_while(|&k| k <= count).product::<f64>();
             let poisson = exp_f64(count * libm::log(self.mean) - self.mean + normal) / factorial;
             return poisson * (core::f64::consts::TAU * self.mean).sqrt() / self.bin(x);
         }
-        // Stirling's series; from 10 on it is exact to 6e-11.
+        // Stirling's series; its error is below 6e-11 for counts of at least 10.
         let inverse = 1.0 / count;
         let square = inverse * inverse;
         let stirling = inverse * (1.0 / 12.0 - square * (1.0 / 360.0 - square * (1.0 / 1260.0)));
@@ -207,13 +205,13 @@ impl Law {
         exp_f64(exponent) * (self.mean * inverse).sqrt() / self.bin(x)
     }
 
-    /// The middle of the bin of proposals that stand for a count, in standard deviations.
-    fn middle(&self, count: f64) -> f64 {
+    /// Returns the centre of the bin of proposals for a count, in standard deviations.
+    fn centre(&self, count: f64) -> f64 {
         (count + 0.5 - self.mean) / self.root
     }
 
-    /// The mean of the normal density over that bin, of width h = 1/√µ, divided by its value in
-    /// the middle: the series in h, exact to 1e-9.
+    /// Returns the mean of the normal density over the bin of width h = 1/√µ, divided by its value at the centre: a
+    /// series in h with an error below 1e-9.
     fn bin(&self, x: f64) -> f64 {
         let (x2, h2) = (x * x, 1.0 / self.mean);
         let second = x2 - 1.0;
@@ -229,46 +227,46 @@ mod tests {
 
     const MEANS: [f32; 9] = [20.0, 20.7, 31.3, 50.0, 123.4, 1e3, 17_850.0, 3e5, 1e6];
 
-    fn counts_around(law: &Law, from: f64, to: f64) -> impl Iterator<Item = f64> {
-        let first = (law.mean + from * law.root).floor().max(0.0);
-        let last = (law.mean + to * law.root).floor();
+    fn counts_around(quotient: &PoissonQuotient, from: f64, to: f64) -> impl Iterator<Item = f64> {
+        let first = (quotient.mean + from * quotient.root).floor().max(0.0);
+        let last = (quotient.mean + to * quotient.root).floor();
         core::iter::successors(Some(first), |k| Some(k + 1.0)).take_while(move |&k| k <= last)
     }
 
     #[test]
-    fn both_laws_are_what_they_say() {
+    fn proposal_and_poisson_probabilities_are_correct() {
         for mean in MEANS {
-            let law = Law::new(mean);
-            for k in counts_around(&law, -6.0, 6.0) {
-                let [low, high] = [k, k + 1.0].map(|k| (k - law.mean) / law.root);
+            let quotient = PoissonQuotient::new(mean);
+            for k in counts_around(&quotient, -6.0, 6.0) {
+                let [low, high] = [k, k + 1.0].map(|k| (k - quotient.mean) / quotient.root);
                 let tail = |x: f64| 0.5 * libm::erfc(x.abs() / core::f64::consts::SQRT_2);
                 let bin =
                     if low < 0.0 && high > 0.0 { 1.0 - tail(low) - tail(high) } else { (tail(low) - tail(high)).abs() };
-                assert!((law.proposed(k) / bin - 1.0).abs() < 2e-7, "{mean}: {k}");
-                let wanted = libm::exp(k * libm::log(law.mean) - law.mean - libm::lgamma(k + 1.0));
-                let got = law.proposed(k) * law.ratio(k);
+                assert!((quotient.proposed(k) / bin - 1.0).abs() < 2e-7, "{mean}: {k}");
+                let wanted = libm::exp(k * libm::log(quotient.mean) - quotient.mean - libm::lgamma(k + 1.0));
+                let got = quotient.proposed(k) * quotient.ratio(k);
                 assert!((got / wanted - 1.0).abs() < 1e-8, "{mean}: {k}");
             }
         }
     }
 
-    /// What makes the finish exact: the squeeze keeps only what the quotient would keep, there is
-    /// no excess where none is drawn, and where it is drawn it stays below its bound.
+    /// The method is exact if the squeeze test accepts only what the quotient test accepts, if there is no excess below
+    /// its lower limit, and if the excess stays below its bound.
     #[test]
-    fn the_squeeze_and_the_bound_hold() {
+    fn squeeze_and_bound_hold() {
         for mean in MEANS {
-            let law = Law::new(mean);
-            for k in counts_around(&law, -9.0, 9.0) {
-                let short = law.mean - k;
-                let squeeze = 1.0 - short * short * short / (6.0 * law.mean * law.mean);
-                assert!(squeeze.min(1.0) <= law.ratio(k) + 1e-9, "{mean}: {k}");
-                let [low, high] = [k, k + 1.0].map(|k| (k - law.mean) / law.root);
-                let excess = law.proposed(k) * (law.ratio(k) - 1.0);
+            let quotient = PoissonQuotient::new(mean);
+            for k in counts_around(&quotient, -9.0, 9.0) {
+                let short = quotient.mean - k;
+                let squeeze = 1.0 - short * short * short / (6.0 * quotient.mean * quotient.mean);
+                assert!(squeeze.min(1.0) <= quotient.ratio(k) + 1e-9, "{mean}: {k}");
+                let [low, high] = [k, k + 1.0].map(|k| (k - quotient.mean) / quotient.root);
+                let excess = quotient.proposed(k) * (quotient.ratio(k) - 1.0);
                 if low < EXCESS_START {
                     assert!(excess <= 1e-12, "{mean}: {k}");
                 } else {
                     let farthest = (low - EXCESS_CENTRE).abs().max((high - EXCESS_CENTRE).abs());
-                    let bound = EXCESS_BOUND / law.mean * libm::exp(-farthest);
+                    let bound = EXCESS_BOUND / quotient.mean * libm::exp(-farthest);
                     assert!(excess <= bound, "{mean}: {k}");
                 }
             }

@@ -1,9 +1,9 @@
-"""Judges frames of our cameras with the reference implementation of EMVA 1288.
+"""Compares simulated frames with the reference implementation of EMVA 1288.
 
 Usage: python external_emva.py DIR...
 
-Each DIR holds what the example program `emva1288` writes. Needs numpy and emva1288 (1.0.2). Prints a line for each check
-and ends with status 1 at the first that fails.
+Each DIR holds the output of the example `emva1288`. Requires numpy and emva1288 (1.0.2). Prints one line per check and
+exits with status 1 at the first failure.
 """
 
 import json
@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 
 if not hasattr(np, "asfarray"):
-    # NumPy 2 has dropped it; the package still calls it.
+    # NumPy 2 removed `asfarray`; the package still calls it.
     np.asfarray = lambda a, dtype=np.float64: np.asarray(a, dtype=dtype)
 
 from emva1288 import process  # noqa: E402
 
-# What is measured, and how far it may be off, as a share.
+# Name, measured value, relative tolerance.
 CHECKS = [
     ("gain", lambda r: r.K, 0.01),
     ("quantum_efficiency", lambda r: r.QE / 100, 0.01),
@@ -29,7 +29,7 @@ CHECKS = [
 ]
 
 
-def judge(folder):
+def measure(folder):
     frames = process.ParseEmvaDescriptorFile(str(folder / "frames.txt"), loglevel=logging.WARNING)
     images = process.LoadImageData(frames.images, loglevel=logging.WARNING)
     data = process.Data1288(images.data, loglevel=logging.WARNING)
@@ -39,12 +39,12 @@ def judge(folder):
 def main(folders):
     for folder in map(Path, folders):
         expected = json.loads((folder / "expected.json").read_text())
-        results = judge(folder)
+        results = measure(folder)
         for name, measured, tolerance in CHECKS:
             found, off = measured(results), measured(results) / expected[name] - 1
             line = f"{folder.name}: {name} {found:.5g}, {100 * off:+.2f} % of {expected[name]:.5g}"
             if not abs(off) < tolerance:
-                print(f"FAILED: {line}; {100 * tolerance:g} % are allowed")
+                print(f"FAILED: {line}; tolerance {100 * tolerance:g} %")
                 sys.exit(1)
             print(f"ok: {line}")
 

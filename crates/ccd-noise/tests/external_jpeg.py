@@ -1,10 +1,10 @@
-"""Compares what our JPEG step leaves of images with what Pillow saves and loads again.
+"""Compares the JPEG step with images that Pillow saves and loads again.
 
 Usage: python external_jpeg.py DIR
 
-DIR holds what the example program `jpeg` writes. Needs numpy and pillow. Prints a line for each check and ends with
-status 1 at the first that fails. With the library of the Independent JPEG Group, or libjpeg-turbo, no level differs; a
-difference of 2 is allowed, for other libraries.
+DIR holds the output of the example `jpeg`. Requires numpy and pillow. Prints one line per check and exits with status 1
+at the first failure. With the library of the Independent JPEG Group or with libjpeg-turbo, no level differs. For other
+libraries a difference of 2 is allowed.
 """
 
 import io
@@ -26,11 +26,11 @@ def main(folder):
         expected = np.asarray(Image.open(memory), dtype=int)
         found = np.asarray(Image.open(path), dtype=int)
         if found.shape != expected.shape:
-            print(f"FAILED: {path.name} is {found.shape}, not {expected.shape}")
+            print(f"FAILED: {path.name} has shape {found.shape}, expected {expected.shape}")
             sys.exit(1)
         worst = abs(found - expected).max()
         if worst > 2:
-            print(f"FAILED: {path.name} differs by {worst} levels; 2 are allowed")
+            print(f"FAILED: {path.name} differs by {worst} levels, tolerance 2")
             sys.exit(1)
         print(f"ok: {path.name} differs by {worst} levels at most")
 

@@ -1,9 +1,9 @@
-//! How long does light take through stained pixels: summed over wavelengths, as three vectors, and along a curve?
+//! Benchmarks of the light of stained pixels: summed over wavelengths, as three vectors, and as a curve.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use dye_spectra::{Colour, ColourParams, DYES, Dye, Mixing, amounts};
 
-/// A tile of 256 x 256 pixels.
+/// Pixels of a tile of 256 x 256.
 const PIXELS: usize = 256 * 256;
 
 fn sums(c: &mut Criterion) {

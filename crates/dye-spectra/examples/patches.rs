@@ -1,25 +1,25 @@
-//! Writes the picture of the crate page: cytoplasms with a nucleus each, from pale to dark, as a microscope camera
-//! sees them and as it shows them. The path may be given as argument.
+//! Writes the image of the crate documentation: cytoplasms with a nucleus each, from pale to dark, as a microscope
+//! camera measures and displays them. Optional argument: the output path.
 
 use std::error::Error;
 
 use dye_spectra::{Amounts, Colour, ColourParams, DYES, Dye, amounts, encode_srgb};
 use image::{Rgb, RgbImage};
 
-/// Side of a patch, gap between patches and radius of a nucleus, in pixels.
+/// Size of a patch, gap between patches and radius of a nucleus, in pixels.
 const PATCH: usize = 56;
 const GAP: usize = 4;
 const NUCLEUS: f64 = 13.0;
-/// How strongly all is stained, from left to right.
+/// Stain strengths from left to right.
 const STRENGTHS: [f64; 6] = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0];
 
-/// Cytoplasms, a row each.
+/// Returns the cytoplasms, one per row.
 fn cytoplasms() -> [Amounts; 5] {
     [
         amounts([(Dye::LightGreen, 0.15), (Dye::EosinY, 0.03)]),
         amounts([(Dye::EosinY, 0.18), (Dye::OrangeG, 0.05)]),
         amounts([(Dye::OrangeG, 0.45)]),
-        // One of the first kind over one of the second.
+        // The first cytoplasm over the second.
         amounts([(Dye::LightGreen, 0.15), (Dye::EosinY, 0.21), (Dye::OrangeG, 0.05)]),
         [0.0; DYES],
     ]
@@ -28,7 +28,7 @@ fn cytoplasms() -> [Amounts; 5] {
 /// Haematein of a nucleus.
 const NUCLEAR: f64 = 0.5;
 
-/// Amounts at a pixel of one half of the picture.
+/// Returns the amounts at a pixel of one half of the image.
 fn scene(x: usize, y: usize) -> Amounts {
     let cytoplasms = cytoplasms();
     let [(column, in_x), (row, in_y)] = [x, y].map(|v| (v / (PATCH + GAP), v % (PATCH + GAP)));
@@ -57,25 +57,25 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut light = [(); 3].map(|()| vec![0.0; width * height]);
     colour.transmittance_into(planes.each_ref().map(|plane| &plane[..]), light.each_mut().map(|plane| &mut plane[..]));
 
-    // Left what the white-balanced camera measures, right what a screen should show.
-    let mut picture = RgbImage::new(u32::try_from(2 * width)?, u32::try_from(height)?);
-    for (y, row) in picture.rows_mut().enumerate() {
+    // Left: white-balanced camera light. Right: display colours.
+    let mut image = RgbImage::new(u32::try_from(2 * width)?, u32::try_from(height)?);
+    for (y, row) in image.rows_mut().enumerate() {
         for (x, pixel) in row.enumerate() {
-            let seen: [f64; 3] = std::array::from_fn(|c| f64::from(light[c][y * width + x % width]));
-            let screen = colour.to_srgb().map(|row| row.iter().zip(seen).map(|(m, v)| m * v).sum());
-            *pixel = Rgb(if x < width { seen.map(linear) } else { screen.map(encode_srgb) });
+            let camera: [f64; 3] = std::array::from_fn(|c| f64::from(light[c][y * width + x % width]));
+            let screen = colour.to_srgb().map(|row| row.iter().zip(camera).map(|(m, v)| m * v).sum());
+            *pixel = Rgb(if x < width { camera.map(linear) } else { screen.map(encode_srgb) });
         }
     }
-    picture.save(path)?;
+    image.save(path)?;
     Ok(())
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "pixels are single precision")]
+#[expect(clippy::cast_possible_truncation, reason = "pixels use single precision")]
 fn single(value: f64) -> f32 {
     value as f32
 }
 
-/// Light as a byte, without the curve of screens.
+/// Converts light to 8 bits without the sRGB curve.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 255 after clamping")]
 fn linear(light: f64) -> u8 {
     (255.0 * light.clamp(0.0, 1.0) + 0.5) as u8

@@ -4,33 +4,33 @@ use crate::params::{ColourParams, Error, Mixing, require};
 use crate::rows::{self, Terms, Wavelength};
 use crate::srgb;
 
-/// Bands over which lamp times sensitivity is summed: 0.25 nm each, where the sharpest edge of a sensitivity has a
-/// standard deviation of 3.7 nm.
+/// Bands of the integral of lamp times sensitivity: 0.25 nm each. The sharpest edge of a sensitivity has a standard
+/// deviation of 3.7 nm.
 const FINE_BANDS: usize = 1200;
 
-/// One wavelength of a channel.
+/// A wavelength of a channel with its weight.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Node {
-    /// The wavelength in µm.
+    /// Wavelength in µm.
     pub wavelength_um: f64,
-    /// Its share of the channel's light; the shares of a channel add up to 1.
+    /// Fraction of the channel's light. The weights of a channel sum to 1.
     pub weight: f64,
 }
 
-/// What one channel of the camera sees of an empty slide.
+/// Properties of a camera channel for an empty slide.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
     /// Mean wavelength of its light in µm.
     pub wavelength_um: f64,
-    /// Full width in µm of an even band with the same variance.
+    /// Full width in µm of a rectangular band with the same variance.
     pub bandwidth_um: f64,
-    /// Its light, relative to that of the strongest channel, whose is 1.
-    pub share: f64,
-    /// The wavelengths, the same in all channels, and how much each counts.
+    /// Light relative to the strongest channel.
+    pub relative_light: f64,
+    /// Wavelengths, the same in all channels, with their weights.
     pub nodes: Vec<Node>,
 }
 
-/// The light of each channel as a function of the amounts of dye.
+/// Light of each channel as a function of dye amounts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Colour {
     channels: [Channel; 3],
@@ -40,11 +40,11 @@ pub struct Colour {
 }
 
 impl Colour {
-    /// Takes lamp and sensor at their wavelengths.
+    /// Evaluates lamp and sensor at the wavelengths.
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfRange`] if a field of `params` is outside its range.
+    /// [`Error::OutOfRange`] if a field of `params` is out of range.
     pub fn new(params: &ColourParams) -> Result<Self, Error> {
         params.check()?;
         let channels = channels(params);
@@ -63,48 +63,50 @@ impl Colour {
         Ok(Self { channels, rows: Terms::new(&terms), terms, to_srgb })
     }
 
-    /// What red, green and blue see of an empty slide.
+    /// Returns the properties of the red, green and blue channels for an empty slide.
     #[must_use]
     pub fn channels(&self) -> &[Channel; 3] {
         &self.channels
     }
 
-    /// Factors that make the empty slide grey, as a microscope camera's white balance does: 1 / share.
+    /// Returns white balance gains, which make the empty slide grey: 1 / `relative_light`.
     #[must_use]
     pub fn white_balance(&self) -> [f64; 3] {
-        self.channels.each_ref().map(|channel| 1.0 / channel.share)
+        self.channels.each_ref().map(|channel| 1.0 / channel.relative_light)
     }
 
-    /// From white-balanced light in the camera's channels to linear sRGB: a row of the matrix for each of red, green
-    /// and blue. White stays white; the rest is a least-squares fit to how the 1931 standard observer, adapted to
-    /// the lamp, sees stained smears. Results can lie somewhat outside 0 to 1.
+    /// Returns the colour matrix from white-balanced camera channels to linear sRGB, one row per red, green and blue.
+    ///
+    /// White stays white. The rest is a least-squares fit to the colours of stained smears for the 1931 standard
+    /// observer, adapted to the lamp. Results may lie slightly outside 0 to 1.
     #[must_use]
     pub fn to_srgb(&self) -> &[[f64; 3]; 3] {
         &self.to_srgb
     }
 
-    /// Light in each channel relative to the empty slide, in double precision.
+    /// Returns the light in each channel relative to an empty slide, in double precision.
     #[must_use]
     pub fn transmittance(&self, amounts: &Amounts) -> [f64; 3] {
         rows::exact(&self.terms, amounts)
     }
 
-    /// Light in each channel relative to the empty slide, from planes of amounts in the order of [`Dye::ALL`], each 0
-    /// or more; an empty plane stands for none of that dye. What a pixel gets depends on its own amounts alone, and
-    /// is exactly 1 where they are 0. Absolute error below 1e-5.
+    /// Writes the light in each channel relative to an empty slide to `out`.
+    ///
+    /// `amounts` are planes in the order of [`Dye::ALL`], with values of at least 0. An empty plane means no dye. Each
+    /// pixel depends only on its own amounts, and is exactly 1 if they are 0. The absolute error is below 1e-5.
     ///
     /// # Panics
     ///
-    /// If the planes of `out` differ in length, or a plane of `amounts` is neither empty nor as long as they are.
+    /// If the planes of `out` differ in length, or a non-empty plane of `amounts` has another length.
     pub fn transmittance_into(&self, amounts: [&[f32]; DYES], out: [&mut [f32]; 3]) {
         let pixels = out[0].len();
-        assert!(out.iter().all(|plane| plane.len() == pixels), "the channels differ in length");
+        assert!(out.iter().all(|plane| plane.len() == pixels), "all channels must have the same length");
         let fits = |plane: &&[f32]| plane.is_empty() || plane.len() == pixels;
-        assert!(amounts.iter().all(fits), "a plane of amounts is not as long as the channels");
+        assert!(amounts.iter().all(fits), "planes of amounts must be empty or as long as the channels");
         rows::transmittance(&self.rows, amounts, out);
     }
 
-    /// The light of a mixture of dyes as a function of how much there is of it.
+    /// Returns the light of a mixture of dyes as a function of its amount.
     ///
     /// # Errors
     ///
@@ -116,8 +118,8 @@ impl Colour {
         Ok(Curve::new(&self.terms, mix))
     }
 
-    /// Absorbance in each channel of a thin amount of a dye, scaled to length 1: the dye's vector of colour
-    /// deconvolution.
+    /// Returns the stain vector of a dye for colour deconvolution: its absorbance in each channel at low density,
+    /// normalised to length 1.
     #[must_use]
     pub fn stain_vector(&self, dye: Dye) -> [f64; 3] {
         let thin = |c: usize| {
@@ -130,7 +132,7 @@ impl Colour {
     }
 }
 
-/// Mean absorbance of each dye over a channel's light, for that channel alone.
+/// Returns the mean absorbance of each dye over a channel's light, with a weight of 1 for that channel.
 fn mean_term(spectral: &[Wavelength], c: usize) -> Wavelength {
     let mean = |d: usize| spectral.iter().map(|(absorbances, weights)| weights[c] * absorbances[d]).sum();
     let mut weights = [0.0; 3];
@@ -143,7 +145,7 @@ fn channels(params: &ColourParams) -> [Channel; 3] {
         let power = params.lamp.power(wavelength_um);
         params.sensor.sensitivity(wavelength_um).map(|sensitivity| sensitivity * power)
     };
-    let fine: Vec<(f64, [f64; 3])> = params.middles(FINE_BANDS).map(|w| (w, light(w))).collect();
+    let fine: Vec<(f64, [f64; 3])> = params.band_centres(FINE_BANDS).map(|w| (w, light(w))).collect();
     let total = |c: usize| fine.iter().map(|(_, light)| light[c]).sum::<f64>();
     let strongest = (0..3).map(total).fold(0.0, f64::max);
     std::array::from_fn(|c| {
@@ -151,18 +153,19 @@ fn channels(params: &ColourParams) -> [Channel; 3] {
         let wavelength_um = mean(&|w| w);
         let variance = mean(&|w| (w - wavelength_um) * (w - wavelength_um));
         let at = |w: f64| Node { wavelength_um: w, weight: light(w)[c] };
-        let mut nodes: Vec<Node> = params.middles(params.wavelengths).map(at).collect();
+        let mut nodes: Vec<Node> = params.band_centres(params.wavelengths).map(at).collect();
         let sum: f64 = nodes.iter().map(|node| node.weight).sum();
         nodes.iter_mut().for_each(|node| node.weight /= sum);
-        // An even band of width b has the variance b²/12.
-        Channel { wavelength_um, bandwidth_um: (12.0 * variance).sqrt(), share: total(c) / strongest, nodes }
+        // A rectangular band of width b has the variance b²/12.
+        Channel { wavelength_um, bandwidth_um: (12.0 * variance).sqrt(), relative_light: total(c) / strongest, nodes }
     })
 }
 
 #[cfg(feature = "image")]
 impl Colour {
-    /// The picture that a screen shows: light of [`transmittance_into`](Self::transmittance_into), row by row of `width`,
-    /// by the matrix [`to_srgb`](Self::to_srgb) and the curve [`encode_srgb`](crate::encode_srgb).
+    /// Returns an 8-bit sRGB image of light from [`transmittance_into`](Self::transmittance_into), in rows of `width`
+    /// pixels. Applies the matrix [`to_srgb`](Self::to_srgb) and the transfer curve
+    /// [`encode_srgb`](crate::encode_srgb).
     ///
     /// ```
     /// use dye_spectra::{Colour, ColourParams, Dye, amounts};
@@ -172,24 +175,24 @@ impl Colour {
     /// let mut light = [(); 3].map(|()| vec![0.0; ramp.len()]);
     /// let eosin = colour.curve(&amounts([(Dye::EosinY, 1.0)]))?;
     /// eosin.transmittance_into(&ramp, light.each_mut().map(|plane| &mut plane[..]));
-    /// let picture = colour.srgb_image(light.each_ref().map(|plane| &plane[..]), 64);
-    /// assert_eq!(picture.get_pixel(0, 0).0, [255; 3]);
+    /// let image = colour.srgb_image(light.each_ref().map(|plane| &plane[..]), 64);
+    /// assert_eq!(image.get_pixel(0, 0).0, [255; 3]);
     /// # Ok::<(), dye_spectra::Error>(())
     /// ```
     ///
     /// # Panics
     ///
-    /// If the planes of `light` are not whole rows of `width`, all of one length.
+    /// If the planes of `light` differ in length, or their length is not a multiple of `width`.
     #[must_use]
     pub fn srgb_image(&self, light: [&[f32]; 3], width: usize) -> image::RgbImage {
         let pixels = light[0].len();
-        assert!(light.iter().all(|plane| plane.len() == pixels), "the channels differ in length");
-        assert!(width > 0 && pixels.is_multiple_of(width), "width {width} must divide the {pixels} pixels");
-        let side = |pixels: usize| u32::try_from(pixels).expect("sides are below 2^32");
+        assert!(light.iter().all(|plane| plane.len() == pixels), "all channels must have the same length");
+        assert!(width > 0 && pixels.is_multiple_of(width), "{pixels} pixels are not a multiple of the width, {width}");
+        let side = |pixels: usize| u32::try_from(pixels).expect("width and height are below 2^32");
         image::RgbImage::from_fn(side(width), side(pixels / width), |x, y| {
             let i = y as usize * width + x as usize;
-            let seen = light.map(|plane| f64::from(plane[i]));
-            image::Rgb(self.to_srgb().map(|row| srgb::encode_srgb(row.iter().zip(seen).map(|(m, v)| m * v).sum())))
+            let camera = light.map(|plane| f64::from(plane[i]));
+            image::Rgb(self.to_srgb().map(|row| srgb::encode_srgb(row.iter().zip(camera).map(|(m, v)| m * v).sum())))
         })
     }
 }

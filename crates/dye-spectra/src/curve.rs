@@ -3,64 +3,65 @@ use multiversion::multiversion;
 use crate::dye::{Amounts, DYES};
 use crate::rows::{LANES, Terms, Wavelength, exact, padded};
 
-/// Degree of the polynomials: with `DEEPEST`, an error below 1e-5.
+/// Degree of the polynomials. Their error up to `MAX_ABSORBANCE` is below 1e-5.
 const DEGREE: usize = 9;
-/// Absorbance, at the wavelength that absorbs most, up to which the polynomials serve. Nothing that cells bind is so
-/// dark: one part in a thousand passes.
-const DEEPEST: f64 = 3.0;
+/// Largest peak absorbance of the polynomials, a transmittance of one in a thousand. Stained cells absorb less.
+const MAX_ABSORBANCE: f64 = 3.0;
 
-/// Light in each channel as a function of one number: how much there is of one mixture of dyes.
+/// Light in each channel as a function of the amount of one mixture of dyes.
 ///
-/// Much faster than the sum over wavelengths, since that sum is smooth: a polynomial each for the channels serves up
-/// to absorbance 3; beyond, the wavelengths are summed.
+/// Polynomials replace the sum over wavelengths up to an absorbance of 3, which is much faster. Larger amounts use the
+/// sum.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    /// Of Q_c in powers of u = amount·`scale` − 1, which is −1 to 1; light is 1 − amount·Q_c(u), so exactly 1 at none.
+    /// Coefficients of Q_c in powers of u = amount·`scale` − 1, from −1 to 1. Light is 1 − amount·Q_c(u), exactly 1 at
+    /// amount 0.
     coefficients: [[f32; DEGREE + 1]; 3],
     scale: f32,
-    /// The largest amount of the polynomials.
-    most: f32,
-    /// For larger amounts: the mixture stands where the first dye does.
+    /// Largest amount for the polynomials.
+    max_amount: f32,
+    /// Sum for larger amounts; the mixture takes the position of the first dye.
     beyond: Terms,
 }
 
 impl Curve {
-    #[expect(clippy::cast_possible_truncation, reason = "pixels are single precision")]
+    #[expect(clippy::cast_possible_truncation, reason = "pixels use single precision")]
     pub(crate) fn new(terms: &[Wavelength], mix: &Amounts) -> Self {
-        let alone = |amount: f64| {
-            let mut alone = [0.0; DYES];
-            alone[0] = amount;
-            alone
+        let single_dye = |amount: f64| {
+            let mut amounts = [0.0; DYES];
+            amounts[0] = amount;
+            amounts
         };
-        let mixed = |absorbances: &Amounts| absorbances.iter().zip(mix).map(|(a, share)| a * share).sum::<f64>();
-        let terms: Vec<Wavelength> = terms.iter().map(|(a, weights)| (alone(mixed(a)), *weights)).collect();
+        let mixed = |absorbances: &Amounts| absorbances.iter().zip(mix).map(|(a, amount)| a * amount).sum::<f64>();
+        let terms: Vec<Wavelength> = terms.iter().map(|(a, weights)| (single_dye(mixed(a)), *weights)).collect();
         let steepest = terms.iter().fold(0.0_f64, |steepest, (a, _)| steepest.max(a[0]));
-        // A mixture of nothing absorbs nothing, however much of it there is.
-        let most = if steepest > 0.0 { (DEEPEST / steepest).min(f64::from(f32::MAX)) } else { f64::from(f32::MAX) };
+        // An empty mixture absorbs nothing at any amount.
+        let max_amount =
+            if steepest > 0.0 { (MAX_ABSORBANCE / steepest).min(f64::from(f32::MAX)) } else { f64::from(f32::MAX) };
         let quotient = |u: f64| {
-            let amount = 0.5 * most * (u + 1.0);
-            exact(&terms, &alone(amount)).map(|light| (1.0 - light) / amount)
+            let amount = 0.5 * max_amount * (u + 1.0);
+            exact(&terms, &single_dye(amount)).map(|light| (1.0 - light) / amount)
         };
         Self {
             coefficients: interpolate(quotient).map(|channel| channel.map(|c| c as f32)),
-            scale: (2.0 / most) as f32,
-            most: most as f32,
+            scale: (2.0 / max_amount) as f32,
+            max_amount: max_amount as f32,
             beyond: Terms::new(&terms),
         }
     }
 
-    /// Light in each channel relative to the empty slide, from amounts of the mixture, each 0 or more. What a pixel
-    /// gets depends on its own amount alone, and is exactly 1 where that is 0. Absolute error below 1e-5.
+    /// Writes the light in each channel relative to an empty slide to `out`, for amounts of the mixture of at least 0.
+    /// Each pixel depends only on its own amount, and is exactly 1 at 0. The absolute error is below 1e-5.
     ///
     /// # Panics
     ///
-    /// If a plane of `out` is not as long as `amount`.
+    /// If a plane of `out` and `amount` differ in length.
     pub fn transmittance_into(&self, amount: &[f32], out: [&mut [f32]; 3]) {
-        assert!(out.iter().all(|plane| plane.len() == amount.len()), "a channel is not as long as the amounts");
+        assert!(out.iter().all(|plane| plane.len() == amount.len()), "channels and amounts must have the same length");
         rows(self, amount, out);
     }
 
-    /// Light of a few pixels.
+    /// Returns the light of a block of pixels.
     #[inline(always)]
     fn block(&self, amount: &[f32; LANES]) -> [[f32; LANES]; 3] {
         let mut light = [[0.0; LANES]; 3];
@@ -71,11 +72,11 @@ impl Curve {
                 *light = 1.0 - amount * quotient;
             }
         }
-        if amount.iter().fold(false, |any, &amount| any | (amount > self.most)) {
+        if amount.iter().fold(false, |any, &amount| any | (amount > self.max_amount)) {
             let exact = self.beyond.block([0], [amount]);
             for (light, exact) in light.iter_mut().zip(exact) {
                 for ((light, exact), &amount) in light.iter_mut().zip(exact).zip(amount) {
-                    *light = if amount > self.most { exact } else { *light };
+                    *light = if amount > self.max_amount { exact } else { *light };
                 }
             }
         }
@@ -96,7 +97,7 @@ fn rows(curve: &Curve, amount: &[f32], out: [&mut [f32]; 3]) {
     }
 }
 
-/// The polynomials in powers of u that agree with three functions at Chebyshev's points of −1 to 1.
+/// Returns the polynomials in powers of u that interpolate three functions at Chebyshev points of −1 to 1.
 fn interpolate(f: impl Fn(f64) -> [f64; 3]) -> [[f64; DEGREE + 1]; 3] {
     const POINTS: usize = DEGREE + 1;
     let mut powers = [[0.0; POINTS]; 3];

@@ -1,31 +1,31 @@
 use crate::light::{Lobe, lobe, sum};
 
-/// What absorbs light in a Papanicolaou smear.
+/// An absorber in a Papanicolaou smear.
 ///
-/// The spectra are models of the *bound* dyes: sums of a few split Gaussians, with maxima where Conn's *Biological
-/// Stains* has them, shifted for binding. They are meant for 0.40 to 0.70 µm; beyond, the Gaussians run out.
-/// Bismarck brown is missing because cells do not bind it (Marshall and Galbraith).
+/// The spectra are models of the *bound* dyes: sums of a few split Gaussians. Their maxima are those of Conn's
+/// *Biological Stains*, shifted for binding. They are valid from 0.40 to 0.70 µm. Bismarck brown is missing because
+/// cells do not bind it (Marshall and Galbraith).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Dye {
-    /// Haematein with aluminium, the blue of nuclei; 0.580 µm.
+    /// Aluminium haematein, the blue of nuclei; peak at 0.580 µm.
     Haematein,
-    /// Eosin Y, the pink of superficial cells; 0.532 µm.
+    /// Eosin Y, the pink of superficial cells; peak at 0.532 µm.
     EosinY,
-    /// Light green SF, the blue-green of intermediate and parabasal cells; 0.628 µm, and 0.425 µm.
+    /// Light green SF, the blue-green of intermediate and parabasal cells; peaks at 0.628 µm and 0.425 µm.
     LightGreen,
-    /// Orange G, the orange of keratin; 0.470 µm.
+    /// Orange G, the orange of keratin; peak at 0.470 µm.
     OrangeG,
-    /// What absorbs alike at all wavelengths: soot, dust, ink.
+    /// Equal absorbance at all wavelengths: soot, dust, ink.
     Neutral,
 }
 
-/// How many dyes there are.
+/// Number of dyes.
 pub const DYES: usize = Dye::ALL.len();
 
-/// How much there is of each dye, in the order of [`Dye::ALL`]: its decadic absorbance at its own peak, 0 or more.
+/// Amount of each dye, in the order of [`Dye::ALL`]: its decadic absorbance at its peak, at least 0.
 pub type Amounts = [f64; DYES];
 
-/// Amounts of the dyes named, 0 of the others; a dye named twice counts twice.
+/// Returns amounts of the named dyes, and 0 for the others. Repeated dyes add up.
 ///
 /// ```
 /// use dye_spectra::{Dye, amounts};
@@ -40,7 +40,7 @@ pub fn amounts<const N: usize>(named: [(Dye, f64); N]) -> Amounts {
     amounts
 }
 
-/// Decadic absorbance at one wavelength of all dyes together: Beer and Lambert's law, A(λ) = Σ_d c_d·ε_d(λ).
+/// Returns the total decadic absorbance at a wavelength by the Beer–Lambert law: A(λ) = Σ_d c_d·ε_d(λ).
 #[must_use]
 pub fn absorbance(amounts: &Amounts, wavelength_um: f64) -> f64 {
     Dye::ALL.iter().zip(amounts).map(|(dye, amount)| amount * dye.absorbance(wavelength_um)).sum()
@@ -50,7 +50,7 @@ impl Dye {
     /// All dyes, in the order of [`Amounts`].
     pub const ALL: [Self; 5] = [Self::Haematein, Self::EosinY, Self::LightGreen, Self::OrangeG, Self::Neutral];
 
-    /// Decadic absorbance at a wavelength of the amount whose absorbance at its peak is 1 (within 0.001).
+    /// Returns the decadic absorbance at a wavelength for an amount of 1; its peak is 1 within 0.001.
     #[must_use]
     pub fn absorbance(self, wavelength_um: f64) -> f64 {
         match self {
@@ -80,7 +80,7 @@ mod tests {
     const COLUMNS: [usize; 4] = [1, 2, 4, 3];
 
     #[test]
-    fn spectra_are_those_of_the_table() {
+    fn spectra_match_the_table() {
         let table = include_str!("../tests/dye_models.csv");
         for row in table.lines().skip(1) {
             let row: Vec<f64> = row.split(',').map(|cell| cell.parse().unwrap()).collect();
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn the_peak_is_one_where_it_is_said_to_be() {
+    fn peaks_are_one_at_the_documented_wavelengths() {
         let peaks_um = [0.580, 0.532, 0.628, 0.470];
         for (dye, peak_um) in Dye::ALL.into_iter().zip(peaks_um) {
             let at = |i: &i32| dye.absorbance(f64::from(*i) * 1e-4);
@@ -104,16 +104,16 @@ mod tests {
     }
 
     #[test]
-    fn order_of_names_is_order_of_amounts() {
+    fn dyes_and_amounts_have_the_same_order() {
         for (i, dye) in Dye::ALL.into_iter().enumerate() {
             assert_eq!(dye as usize, i);
             assert_eq!(absorbance(&amounts([(dye, 0.5)]), 0.55), 0.5 * dye.absorbance(0.55));
         }
     }
 
-    /// Holmquist's filter, and the paper's, is at 0.570 µm.
+    /// The filter of Holmquist and of the paper is at 0.570 µm.
     #[test]
-    fn nuclei_stand_out_best_between_560_and_585_nm() {
+    fn nuclear_contrast_is_largest_between_560_and_585_nm() {
         let nucleus = amounts([(Dye::Haematein, 0.5)]);
         let cytoplasms = [
             amounts([(Dye::LightGreen, 0.15), (Dye::EosinY, 0.03)]),

@@ -1,4 +1,4 @@
-/// One peak of a spectrum: a Gaussian with a width of its own on either side.
+/// A peak of a spectrum: a split Gaussian.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lobe {
     height: f64,
@@ -8,12 +8,12 @@ pub(crate) struct Lobe {
     above_um: f64,
 }
 
-/// A lobe by height and, in nanometres, as tables of spectra have them, peak and standard deviations below and above.
+/// Creates a lobe from its height, and its peak and standard deviations below and above in nanometres.
 pub(crate) const fn lobe(height: f64, peak_nm: f64, below_nm: f64, above_nm: f64) -> Lobe {
     Lobe { height, peak_um: peak_nm * 1e-3, below_um: below_nm * 1e-3, above_um: above_nm * 1e-3 }
 }
 
-/// Sum of the lobes at a wavelength.
+/// Returns the sum of the lobes at a wavelength.
 pub(crate) fn sum(lobes: &[Lobe], wavelength_um: f64) -> f64 {
     let one = |lobe: &Lobe| {
         let from_peak = wavelength_um - lobe.peak_um;
@@ -23,61 +23,61 @@ pub(crate) fn sum(lobes: &[Lobe], wavelength_um: f64) -> f64 {
     lobes.iter().map(one).sum()
 }
 
-/// What shines.
+/// Lamp of the microscope.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Lamp {
-    /// A glowing wire, as a black body (Planck's law).
+    /// A halogen lamp, modelled as a black body (Planck's law).
     Halogen {
-        /// Its colour temperature in kelvin, 1000 to 10 000; 3200 for a microscope's lamp at its rated voltage.
+        /// Colour temperature in kelvin, 1000 to 10 000. A microscope lamp at its rated voltage has 3200.
         temperature_k: f64,
     },
-    /// A white diode, blue with a yellow phosphor: CIE's LED-B3 (CIE 015:2018, 4103 K), within 0.04 of its peak.
+    /// A white phosphor-converted LED: CIE's LED-B3 (CIE 015:2018, 4103 K), within 0.04 of its peak.
     Led,
-    /// The same power at all wavelengths.
-    Even,
+    /// An equal-energy spectrum.
+    EqualEnergy,
 }
 
 impl Lamp {
-    /// Power at a wavelength, in a unit of its own.
+    /// Returns the power at a wavelength in arbitrary units.
     pub(crate) fn power(self, wavelength_um: f64) -> f64 {
         match self {
             Self::Halogen { temperature_k } => {
-                let [x, x0] = [wavelength_um, MIDDLE_UM].map(|w| SECOND_RADIATION_UM_K / (w * temperature_k));
-                let ratio = MIDDLE_UM / wavelength_um;
-                // Planck's law B(λ) ∝ λ⁻⁵ / (exp(c₂/λT) − 1), relative to its value in the middle.
+                let [x, x0] = [wavelength_um, CENTRE_UM].map(|w| SECOND_RADIATION_UM_K / (w * temperature_k));
+                let ratio = CENTRE_UM / wavelength_um;
+                // Planck's law B(λ) ∝ λ⁻⁵ / (exp(c₂/λT) − 1), relative to its value at the centre.
                 ratio * ratio * ratio * ratio * ratio * libm::expm1(x0) / libm::expm1(x)
             }
             Self::Led => sum(&LED_B3, wavelength_um),
-            Self::Even => 1.0,
+            Self::EqualEnergy => 1.0,
         }
     }
 }
 
 /// Second radiation constant c₂ = hc/k, in µm·K (CODATA 2018).
 const SECOND_RADIATION_UM_K: f64 = 14_387.768_77;
-/// Middle of the visible range.
-const MIDDLE_UM: f64 = 0.55;
+/// Centre of the visible range.
+const CENTRE_UM: f64 = 0.55;
 
 const LED_B3: [Lobe; 3] =
     [lobe(0.848, 448.2, 9.4, 9.1), lobe(0.199, 514.4, 50.1, 23.1), lobe(0.883, 592.2, 59.3, 56.9)];
 
-/// What sees.
+/// Sensor of the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sensor {
-    /// A colour sensor with its infrared filter: red, green and blue of a Nikon D5100 as the National Physical
-    /// Laboratory measured them (Darrodi et al. 2015, doi:10.1364/JOSAA.32.000381; the copy in colour-science
-    /// 0.4.7), within 0.02 of the peak.
+    /// A colour sensor with an infrared filter: red, green and blue of a Nikon D5100 as the National Physical
+    /// Laboratory measured them (Darrodi et al. 2015, doi:10.1364/JOSAA.32.000381; the copy in colour-science 0.4.7),
+    /// within 0.02 of the peak.
     Camera,
-    /// Three equal channels that see all wavelengths alike: a monochrome camera without a filter.
-    Even,
+    /// Three equal channels with the same sensitivity at all wavelengths: a monochrome camera without a filter.
+    Panchromatic,
 }
 
 impl Sensor {
-    /// Sensitivity of the red, green and blue channel to power at a wavelength; 1 at its peak.
+    /// Returns the sensitivity of the red, green and blue channel at a wavelength, 1 at its peak.
     pub(crate) fn sensitivity(self, wavelength_um: f64) -> [f64; 3] {
         match self {
             Self::Camera => [sum(&RED, wavelength_um), sum(&GREEN, wavelength_um), sum(&BLUE, wavelength_um)],
-            Self::Even => [1.0; 3],
+            Self::Panchromatic => [1.0; 3],
         }
     }
 }
@@ -101,12 +101,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_hotter_wire_is_bluer_and_obeys_wien() {
+    fn hotter_lamps_are_bluer_and_follow_wien() {
         let lamp = |temperature_k| Lamp::Halogen { temperature_k };
-        assert!((lamp(3200.0).power(MIDDLE_UM) - 1.0).abs() < 1e-15);
+        assert!((lamp(3200.0).power(CENTRE_UM) - 1.0).abs() < 1e-15);
         assert!(lamp(3200.0).power(0.65) > lamp(3200.0).power(0.45));
-        let share = |t: f64| lamp(t).power(0.45) / lamp(t).power(0.65);
-        assert!(share(2800.0) < share(3200.0) && share(3200.0) < share(5000.0));
+        let blue_to_red = |t: f64| lamp(t).power(0.45) / lamp(t).power(0.65);
+        assert!(blue_to_red(2800.0) < blue_to_red(3200.0) && blue_to_red(3200.0) < blue_to_red(5000.0));
         // λ_max·T = 2898 µm·K
         let hot = lamp(5000.0);
         let peak =
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn each_channel_peaks_where_the_measured_one_does() {
+    fn channel_peaks_match_the_measured_ones() {
         let measured_nm = [590, 530, 460];
         for (c, nm) in measured_nm.into_iter().enumerate() {
             let at = |nm: &i32| Sensor::Camera.sensitivity(f64::from(*nm) * 1e-3)[c];

@@ -2,53 +2,53 @@ use thiserror::Error;
 
 use crate::light::{Lamp, Sensor};
 
-/// Why parameters were refused.
+/// Error of invalid parameters.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// One number lies outside the range its field allows.
+    /// A number is out of range.
     #[error("{field} is {value}; it must be {accepted}")]
     OutOfRange {
-        /// Path of the field, as in `lamp.temperature_k`.
+        /// Path of the field, such as `lamp.temperature_k`.
         field: &'static str,
-        /// What it held.
+        /// The rejected value.
         value: f64,
-        /// What would be accepted.
+        /// Description of the accepted values.
         accepted: &'static str,
     },
 }
 
-/// Fails unless `value` is finite and `holds`.
+/// Returns an error unless `value` is finite and `holds` is true.
 pub(crate) fn require(field: &'static str, value: f64, holds: bool, accepted: &'static str) -> Result<(), Error> {
     if value.is_finite() && holds { Ok(()) } else { Err(Error::OutOfRange { field, value, accepted }) }
 }
 
-/// How the light of a channel follows from the amounts of dye.
+/// Model of a channel's light as a function of dye amounts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Mixing {
-    /// The mean over the wavelengths of the channel of 10^−A(λ).
+    /// The mean of 10^−A(λ) over the wavelengths of the channel.
     #[default]
     Spectral,
-    /// 10 to the minus the mean absorbance, as colour deconvolution has it: each dye is one vector of three
-    /// absorbances. Some four times as fast, and light of slabs multiplies; deep stain comes out too dark and too
+    /// 10 to the power of minus the mean absorbance, as in colour deconvolution: each dye is a vector of three
+    /// absorbances. About four times as fast, and the light of slabs multiplies. Dark stain is too dark and too
     /// saturated.
     ThreeVectors,
 }
 
-/// A lamp, a camera, and the wavelengths at which they are taken.
+/// Parameters of [`Colour`](crate::Colour): lamp, sensor and wavelengths.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColourParams {
-    /// What shines. Default a halogen lamp of 3200 K, ours.
+    /// Lamp. Default a halogen lamp of 3200 K, ours.
     pub lamp: Lamp,
-    /// What sees. Default a colour camera, ours: the paper's is monochrome behind a filter of 0.570 µm.
+    /// Sensor. Default a colour camera, ours; the paper's is monochrome with a filter of 0.570 µm.
     pub sensor: Sensor,
     /// Shortest wavelength in µm, at least 0.40 and below `to_um`. Default 0.40, ours.
     pub from_um: f64,
     /// Longest wavelength in µm, at most 0.70. Default 0.70, ours.
     pub to_um: f64,
-    /// Number of wavelengths, 1 to 1024, in the middles of as many equal bands. Default 16, ours: within 0.003 of 151.
+    /// Number of wavelengths, 1 to 1024, at the centres of equal bands. Default 16, ours: within 0.003 of 151.
     pub wavelengths: usize,
-    /// How the light of a channel follows from the dyes. Default spectral, ours.
+    /// Model of a channel's light. Default spectral, ours.
     pub mixing: Mixing,
 }
 
@@ -76,8 +76,8 @@ impl ColourParams {
         require("wavelengths", wavelengths as f64, (1..=1024).contains(&wavelengths), "from 1 to 1024")
     }
 
-    /// Middles of equal bands.
-    pub(crate) fn middles(&self, bands: usize) -> impl Iterator<Item = f64> + use<> {
+    /// Iterates over the centres of equal bands.
+    pub(crate) fn band_centres(&self, bands: usize) -> impl Iterator<Item = f64> + use<> {
         let (from, width) = (self.from_um, (self.to_um - self.from_um) / bands as f64);
         (0..bands).map(move |i| from + (i as f64 + 0.5) * width)
     }
@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn refusals_name_field_value_and_range() {
+    fn errors_contain_field_value_and_range() {
         let default = ColourParams::default;
         let halogen = |temperature_k| ColourParams { lamp: Lamp::Halogen { temperature_k }, ..default() };
         type Case<'a> = (&'a dyn Fn(f64) -> ColourParams, &'a [f64], &'a str);

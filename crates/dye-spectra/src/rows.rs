@@ -1,11 +1,11 @@
-//! Light over rows of pixels: the same bits everywhere, since nothing but multiplications, additions and conversions
-//! are used, in one order: no fused operation, no library function.
+//! Light of rows of pixels. The bits are the same on every machine: only multiplications, additions and conversions in
+//! a fixed order, without fused operations or library functions.
 
 use multiversion::multiversion;
 
 use crate::dye::{Amounts, DYES};
 
-/// Absorbance of unit amounts, and weight in each channel.
+/// Absorbances of unit amounts, and weights in each channel.
 pub(crate) type Wavelength = (Amounts, [f64; 3]);
 
 /// T_c = Σ_λ w_c(λ)·10^−A(λ)
@@ -21,31 +21,31 @@ pub(crate) fn exact(terms: &[Wavelength], amounts: &Amounts) -> [f64; 3] {
     light
 }
 
-/// Pixels worked on side by side.
+/// Pixels processed in parallel.
 pub(crate) const LANES: usize = 16;
-/// Room for the exponents of one node: a power of two, so that a remainder needs no check.
-const ROOM: usize = DYES.next_power_of_two();
+/// Size of the exponents of a term, a power of two, so that bounds checks are unnecessary.
+const EXPONENTS: usize = DYES.next_power_of_two();
 
-/// One term of the sums: light `weights[c]`·2^Σ_d `exponents[d]`·c_d in channel c.
+/// A term of the sums: light `weights[c]`·2^Σ_d `exponents[d]`·c_d in channel c.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Term {
-    exponents: [f32; ROOM],
+    exponents: [f32; EXPONENTS],
     weights: [f32; 3],
 }
 
-/// The sum of such terms, exactly 1 in every channel where there is no dye.
+/// The sum of terms, exactly 1 in every channel without dye.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Terms {
     terms: Vec<Term>,
-    /// What rounding left of 1 − Σ weights.
+    /// Rounding error 1 − Σ weights.
     rest: [f32; 3],
 }
 
 impl Terms {
-    #[expect(clippy::cast_possible_truncation, reason = "pixels are single precision")]
+    #[expect(clippy::cast_possible_truncation, reason = "pixels use single precision")]
     pub(crate) fn new(terms: &[Wavelength]) -> Self {
         let single = |(absorbances, weights): &Wavelength| {
-            let mut exponents = [0.0; ROOM];
+            let mut exponents = [0.0; EXPONENTS];
             for (exponent, absorbance) in exponents.iter_mut().zip(absorbances) {
                 *exponent = (-absorbance * core::f64::consts::LOG2_10) as f32;
             }
@@ -56,13 +56,13 @@ impl Terms {
         Self { rest: std::array::from_fn(|c| 1.0 - sum(c)), terms }
     }
 
-    /// Light in each channel of a few pixels, summed over the dyes that are there.
+    /// Returns the light in each channel of a block of pixels, skipping absent dyes.
     #[inline(always)]
     fn present(&self, amounts: [&[f32; LANES]; DYES]) -> [[f32; LANES]; 3] {
         let (mut dyes, mut here, mut present) = ([0; DYES], [&NONE; DYES], 0);
         for (dye, block) in amounts.into_iter().enumerate() {
             (dyes[present], here[present]) = (dye, block);
-            // Any bit but the sign of zero.
+            // Any bit except the sign.
             let bits = block.iter().fold(0, |bits, amount| bits | amount.to_bits()) << 1;
             present += usize::from(bits != 0);
         }
@@ -78,14 +78,14 @@ impl Terms {
         }
     }
 
-    /// Light in each channel of a few pixels; no amount is below 0.
+    /// Returns the light in each channel of a block of pixels. Amounts must be at least 0.
     #[inline(always)]
     pub(crate) fn block<const D: usize>(&self, dyes: [usize; D], amounts: [&[f32; LANES]; D]) -> [[f32; LANES]; 3] {
         let mut sums = [[0.0; LANES]; 3];
         for term in &self.terms {
             let mut powers = [0.0; LANES];
             for j in 0..D {
-                let exponent = term.exponents[dyes[j] % ROOM];
+                let exponent = term.exponents[dyes[j] % EXPONENTS];
                 for (power, amount) in powers.iter_mut().zip(amounts[j]) {
                     let absorbed = exponent * amount;
                     *power = if j == 0 { absorbed } else { *power + absorbed };
@@ -109,7 +109,7 @@ impl Terms {
     }
 }
 
-/// Light in each channel from planes of amounts. An empty plane stands for none of that dye.
+/// Writes the light in each channel from planes of amounts. An empty plane means no dye.
 #[multiversion(targets = "simd")]
 pub(crate) fn transmittance(terms: &Terms, amounts: [&[f32]; DYES], out: [&mut [f32]; 3]) {
     let [(red, red_end), (green, green_end), (blue, blue_end)] = out.map(|plane| plane.as_chunks_mut());
@@ -127,22 +127,22 @@ pub(crate) fn transmittance(terms: &Terms, amounts: [&[f32]; DYES], out: [&mut [
 /// A block without dye.
 const NONE: [f32; LANES] = [0.0; LANES];
 
-/// The last pixels of a row, with none after them.
+/// Pads the last pixels of a row with zeros.
 pub(crate) fn padded(end: &[f32]) -> [f32; LANES] {
     let mut block = NONE;
     block[..end.len()].copy_from_slice(end);
     block
 }
 
-/// 2ˣ for x from −120 to 1, 2⁻¹²⁰ below; relative error below 3·10⁻⁶, exact at whole numbers.
+/// Returns 2ˣ for x from −120 to 1, and 2⁻¹²⁰ below. The relative error is below 3·10⁻⁶; integers are exact.
 #[inline(always)]
 fn exp2(x: f32) -> f32 {
-    /// 1.5·2²³: adding it rounds to a whole number, which the lowest bits then hold.
+    /// 1.5·2²³: adding it rounds to an integer, which the lowest bits then hold.
     const ROUND: f32 = 12_582_912.0;
     let x = if x > -120.0 { x } else { -120.0 };
     let shifted = x + ROUND;
     let t = x - (shifted - ROUND);
-    // The polynomial of least relative error on −½ to ½ that is 1 at 0.
+    // The minimax polynomial for relative error on −½ to ½ that is 1 at 0.
     let p = 1.0 + t * (0.693_124_2 + t * (0.240_240_99 + t * (0.055_906_445 + t * 0.009_582_861)));
     f32::from_bits(p.to_bits().wrapping_add(shifted.to_bits() << 23))
 }

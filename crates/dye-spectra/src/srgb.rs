@@ -1,4 +1,4 @@
-//! From the camera's channels to the colours of a screen.
+//! Conversion of camera channels to display colours.
 
 use crate::dye::{Amounts, DYES, Dye, amounts};
 use crate::light::{Lobe, lobe, sum};
@@ -7,8 +7,7 @@ use crate::rows::{Wavelength, exact};
 
 type Matrix = [[f64; 3]; 3];
 
-/// One linear sRGB value, 0 to 1, as the 8 bits that screens and image files expect (IEC 61966-2-1). Values outside
-/// are clamped.
+/// Encodes a linear sRGB value, 0 to 1, as 8 bits (IEC 61966-2-1). Values outside of the range are clamped.
 #[must_use]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 255 after clamping")]
 pub fn encode_srgb(linear: f64) -> u8 {
@@ -23,10 +22,10 @@ const X: [Lobe; 3] = [lobe(1.056, 599.8, 37.9, 31.0), lobe(0.362, 442.0, 16.0, 2
 const Y: [Lobe; 2] = [lobe(0.821, 568.8, 46.9, 40.5), lobe(0.286, 530.9, 16.3, 31.1)];
 const Z: [Lobe; 2] = [lobe(1.217, 437.0, 11.8, 36.0), lobe(0.681, 459.0, 26.0, 13.8)];
 
-/// Bands over which the observer sums: 5 nm, as is the custom in colorimetry.
+/// Bands of the observer's integral: 5 nm, the convention in colorimetry.
 const OBSERVER_BANDS: usize = 60;
 
-/// Bradford's cone responses, their inverse, and those of D65 (ICC.1:2022, annex E).
+/// Bradford cone responses, their inverse, and the white point D65 (ICC.1:2022, annex E).
 const CONES: Matrix = [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]];
 const FROM_CONES: Matrix = [
     [0.986_992_9, -0.147_054_3, 0.159_962_7],
@@ -37,11 +36,11 @@ const D65: [f64; 3] = [0.950_47, 1.0, 1.088_83];
 /// IEC 61966-2-1.
 const XYZ_TO_SRGB: Matrix = [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]];
 
-/// How much the fit holds on to the identity: decides where all channels are alike, and nothing else.
+/// Regularisation towards the identity. It matters only if all channels are equal.
 const RIDGE: f64 = 1e-6;
 
-/// The matrix whose rows add up to 1, so that white stays white, and which best takes the camera's light of stained
-/// smears to what the observer sees.
+/// Returns the colour matrix. Its rows sum to 1, so that white stays white, and it is the best fit from camera light of
+/// stained smears to the observer's colours.
 pub(crate) fn matrix(params: &ColourParams, spectral: &[Wavelength]) -> Matrix {
     let observer = observer(params);
     let pairs: Vec<[[f64; 3]; 2]> = smears().map(|c| [exact(spectral, &c), exact(&observer, &c)]).collect();
@@ -50,8 +49,8 @@ pub(crate) fn matrix(params: &ColourParams, spectral: &[Wavelength]) -> Matrix {
         let identity = |column: usize| if row == column { 1.0 } else { 0.0 };
         let (mut aa, mut ab, mut bb) = (RIDGE, 0.0, RIDGE);
         let (mut ay, mut by) = (RIDGE * identity(0), RIDGE * identity(1));
-        for [camera, seen] in &pairs {
-            let (a, b, y) = (camera[0] - camera[2], camera[1] - camera[2], seen[row] - camera[2]);
+        for [camera, observed] in &pairs {
+            let (a, b, y) = (camera[0] - camera[2], camera[1] - camera[2], observed[row] - camera[2]);
             aa += a * a;
             ab += a * b;
             bb += b * b;
@@ -64,7 +63,7 @@ pub(crate) fn matrix(params: &ColourParams, spectral: &[Wavelength]) -> Matrix {
     })
 }
 
-/// Mixtures over which the fit is made: two strengths of the three cytoplasms, alone, overlapping, and with a nucleus.
+/// Returns the mixtures of the fit: two strengths of three cytoplasms, alone, overlapping, and with a nucleus.
 fn smears() -> impl Iterator<Item = Amounts> {
     let cytoplasms = [
         amounts([(Dye::LightGreen, 0.15), (Dye::EosinY, 0.03)]),
@@ -83,14 +82,15 @@ fn smears() -> impl Iterator<Item = Amounts> {
     })
 }
 
-/// The standard observer, adapted to the lamp, with weights that give linear sRGB; those of each colour add up to 1.
+/// Returns the standard observer, adapted to the lamp, with weights for linear sRGB. The weights of each colour sum to
+/// 1.
 fn observer(params: &ColourParams) -> Vec<Wavelength> {
     let visible = ColourParams { from_um: 0.40, to_um: 0.70, ..params.clone() };
-    let seen = |w: f64| [sum(&X, w), sum(&Y, w), sum(&Z, w)].map(|response| response * params.lamp.power(w));
+    let observed = |w: f64| [sum(&X, w), sum(&Y, w), sum(&Z, w)].map(|response| response * params.lamp.power(w));
     let mut white = [0.0; 3];
-    for w in visible.middles(OBSERVER_BANDS) {
-        for (white, seen) in white.iter_mut().zip(seen(w)) {
-            *white += seen;
+    for w in visible.band_centres(OBSERVER_BANDS) {
+        for (white, observed) in white.iter_mut().zip(observed(w)) {
+            *white += observed;
         }
     }
     let (cones, cones_d65) = (times(&CONES, white), times(&CONES, D65));
@@ -100,10 +100,10 @@ fn observer(params: &ColourParams) -> Vec<Wavelength> {
     };
     let srgb_white = times(&XYZ_TO_SRGB, adapt(white));
     let term = |w: f64| {
-        let srgb = times(&XYZ_TO_SRGB, adapt(seen(w)));
+        let srgb = times(&XYZ_TO_SRGB, adapt(observed(w)));
         (Dye::ALL.map(|dye| dye.absorbance(w)), std::array::from_fn(|c| srgb[c] / srgb_white[c]))
     };
-    visible.middles(OBSERVER_BANDS).map(term).collect()
+    visible.band_centres(OBSERVER_BANDS).map(term).collect()
 }
 
 fn times(matrix: &Matrix, vector: [f64; 3]) -> [f64; 3] {

@@ -1,4 +1,4 @@
-//! How long does a blur of a camera frame, or of one object's tile, take at each width?
+//! Benchmarks of blurs of a camera frame and of an object's tile, by width.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use optics_psf::{Border, Gaussian, Method, Scratch};
@@ -37,9 +37,9 @@ fn tile(c: &mut Criterion) {
     group.throughput(Throughput::Elements(tile.len() as u64));
     for sigma in [1.0, 2.0, 4.0, 8.0] {
         let gaussian = Gaussian::new(sigma).expect("a finite width");
-        let (mut dst, _) = gaussian.spread(&tile, width);
+        let (mut dst, _) = gaussian.blur_expanded(&tile, width);
         group.bench_function(BenchmarkId::from_parameter(sigma), |b| {
-            b.iter(|| gaussian.spread_into(&tile, width, &mut dst, &mut scratch));
+            b.iter(|| gaussian.blur_expanded_into(&tile, width, &mut dst, &mut scratch));
         });
     }
 }

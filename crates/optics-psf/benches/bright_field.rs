@@ -1,4 +1,4 @@
-//! How long does a picture take beside the real FFT pairs that it cannot do without, and how much a further plane?
+//! Benchmarks of images, relative to the real FFT pairs they need, and of further planes.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use optics_psf::{Abbe, AbbeParams, BrightField, BrightFieldParams, Layer, Microscope, MicroscopeParams, Padding};
@@ -9,10 +9,10 @@ const SIDE: usize = 512;
 const SLABS: [f64; 8] = [-4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0];
 
 fn microscope() -> Microscope {
-    Microscope::new(&MicroscopeParams::default()).expect("the defaults are in order")
+    Microscope::new(&MicroscopeParams::default()).expect("the defaults are valid")
 }
 
-/// Discs of absorbance that cover a third of a slab.
+/// Returns the absorbance of discs that cover a third of a slab.
 fn slab(k: usize) -> Vec<f32> {
     let pixel = |i: usize| {
         let (x, y) = ((i % SIDE + 37 * k) % 128, (i / SIDE + 53 * k) % 128);
@@ -30,10 +30,10 @@ fn field(depths_um: &[f64], stages_um: &[f64]) -> BrightField {
         depths_um: depths_um.to_vec(),
         stages_um: stages_um.to_vec(),
     };
-    BrightField::new(&microscope(), &params).expect("the parameters are in order")
+    BrightField::new(&microscope(), &params).expect("the parameters are valid")
 }
 
-/// One real FFT there and one back on the grid of the object: the yardstick.
+/// A real FFT and its inverse on the grid of the object: the unit of comparison.
 fn fft_pair(c: &mut Criterion) {
     let mut planner = RealFftPlanner::<f32>::new();
     let (forward, inverse) = (planner.plan_fft_forward(SIDE), planner.plan_fft_inverse(SIDE));
@@ -79,8 +79,8 @@ fn transpose(from: &[Complex32], width: usize, to: &mut [Complex32]) {
     }
 }
 
-fn picture(c: &mut Criterion) {
-    let mut group = c.benchmark_group("picture");
+fn image(c: &mut Criterion) {
+    let mut group = c.benchmark_group("image");
     group.throughput(Throughput::Elements((SIDE * SIDE) as u64));
     let absorbance: Vec<Vec<f32>> = (0..SLABS.len()).map(slab).collect();
     let mut bench = |name: &str, slabs: &[usize]| {
@@ -127,12 +127,12 @@ fn stack(c: &mut Criterion) {
 }
 
 fn abbe(c: &mut Criterion) {
-    let abbe = Abbe::new(&microscope(), &AbbeParams::default()).expect("the defaults are in order");
-    let layers = [Layer::refracting(2.0, &slab(0), &[]).expect("a finite depth")];
+    let abbe = Abbe::new(&microscope(), &AbbeParams::default()).expect("the defaults are valid");
+    let layers = [Layer::from_absorbance(2.0, &slab(0), &[]).expect("a finite depth")];
     let mut group = c.benchmark_group("abbe");
     group.sample_size(10);
     group.bench_function("one layer, 64 points", |b| b.iter(|| abbe.image(&layers, 0.0)));
 }
 
-criterion_group!(benches, fft_pair, picture, stack, abbe);
+criterion_group!(benches, fft_pair, image, stack, abbe);
 criterion_main!(benches);

@@ -1,7 +1,7 @@
-//! Draws the picture of the crate page: a nucleus through focus by Abbe's integration, by the default and by the
-//! paper's model, and the halo of a speck. The path is the first argument.
+//! Draws the image of the crate documentation: a nucleus through focus by Abbe's integration, by the default model and
+//! by the paper's model, and the halo of a speck. Optional argument: the output path.
 
-#![expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small picture of 8 bits")]
+#![expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small 8-bit image")]
 
 use image::GrayImage;
 use optics_psf::{
@@ -9,10 +9,10 @@ use optics_psf::{
     MicroscopeParams, Padding, Source,
 };
 
-/// Samples of the object, 0.125 µm apart.
+/// Size of the object in samples 0.125 µm apart.
 const SIDE: usize = 192;
 
-/// Pixels of a panel.
+/// Size of a panel in pixels.
 const PANEL: usize = SIDE / 2;
 
 const DEPTHS_UM: [f64; 4] = [0.0, 1.0, 2.0, 4.0];
@@ -22,28 +22,28 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = std::env::args().nth(1).unwrap_or_else(|| "target/bright_field.png".to_owned());
     let microscope = Microscope::new(&MicroscopeParams { condenser_na: 0.6, ..MicroscopeParams::default() })?;
     let nucleus = nucleus();
-    let mut picture = GrayImage::new(4 * PANEL as u32, 4 * PANEL as u32);
+    let mut image = GrayImage::new(4 * PANEL as u32, 4 * PANEL as u32);
     for (column, depth) in DEPTHS_UM.into_iter().enumerate() {
         let abbe = AbbeParams { width: SIDE, height: SIDE, source: Source::Vogel { points: 256 } };
-        let exact = Abbe::new(&microscope, &abbe)?.image(&[Layer::refracting(depth, &nucleus, &[])?], 0.0)?;
-        draw(&mut picture, column, 0, &pixels(&exact.iter().map(|v| *v as f32).collect::<Vec<_>>()));
+        let exact = Abbe::new(&microscope, &abbe)?.image(&[Layer::from_absorbance(depth, &nucleus, &[])?], 0.0)?;
+        draw(&mut image, column, 0, &pixels(&exact.iter().map(|v| *v as f32).collect::<Vec<_>>()));
         draw(
-            &mut picture,
+            &mut image,
             column,
             1,
             &bright_field(&microscope, depth, |field, specimen| {
                 field.set_absorbance(specimen, 0, &nucleus);
             })?,
         );
-        // The paper's pixels are two samples; Eqs. 14 and 11.
+        // A pixel of the paper is two samples; Eqs. 14 and 11.
         let sigma = 2.0 * DepthOfFocus::new(&FocusParams::paper())?.sigma_px(depth);
         let blurred = Gaussian::new(sigma)?.blur(&nucleus, SIDE, Border::Zero);
-        draw(&mut picture, column, 2, &pixels(&blurred.iter().map(|a| libm::exp10f(-a)).collect::<Vec<_>>()));
+        draw(&mut image, column, 2, &pixels(&blurred.iter().map(|a| libm::exp10f(-a)).collect::<Vec<_>>()));
     }
     let speck: Vec<f32> = (0..SIDE * SIDE).map(|i| 0.5 * disc(i, [0.0, 0.0], 1.2)).collect();
     for (column, depth) in SPECK_UM.into_iter().enumerate() {
         draw(
-            &mut picture,
+            &mut image,
             column,
             3,
             &bright_field(&microscope, depth, |field, specimen| {
@@ -52,7 +52,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             })?,
         );
     }
-    picture.save(path)?;
+    image.save(path)?;
     Ok(())
 }
 
@@ -74,14 +74,14 @@ fn bright_field(
     Ok(field.image(&mut specimen, 0))
 }
 
-/// 1 inside a disc around a point in µm, 0 outside, with an edge one sample wide.
+/// Returns 1 inside a disc around a point in µm, 0 outside, with an edge one sample wide.
 fn disc(i: usize, [x, y]: [f32; 2], radius_um: f32) -> f32 {
     let at = |v: usize| (v as f32 - SIDE as f32 / 2.0) * 0.125;
     let (dx, dy) = (at(i % SIDE) - x, at(i / SIDE) - y);
     ((radius_um - (dx * dx + dy * dy).sqrt()) / 0.125 + 0.5).clamp(0.0, 1.0)
 }
 
-/// A nucleus of 8.4 µm with clumps of chromatin on a spiral and a pale patch, in absorbance.
+/// Returns the absorbance of a nucleus of 8.4 µm with chromatin clumps on a spiral and a pale patch.
 fn nucleus() -> Vec<f32> {
     let clump = |k: usize| {
         let (angle, r) = (2.4 * k as f32, 0.75 * (k as f32).sqrt());
@@ -95,7 +95,7 @@ fn nucleus() -> Vec<f32> {
     (0..SIDE * SIDE).map(sample).collect()
 }
 
-/// Means of two by two samples.
+/// Returns means over 2 x 2 samples.
 fn pixels(samples: &[f32]) -> Vec<f32> {
     let mean = |i: usize| {
         let at = |dx, dy| samples[(i / PANEL * 2 + dy) * SIDE + i % PANEL * 2 + dx];
@@ -104,14 +104,14 @@ fn pixels(samples: &[f32]) -> Vec<f32> {
     (0..PANEL * PANEL).map(mean).collect()
 }
 
-/// The middle of a panel, enlarged: in the last row, that of the speck, more.
-fn draw(picture: &mut GrayImage, column: usize, row: usize, panel: &[f32]) {
+/// Draws the centre of a panel, enlarged; the speck in the last row is enlarged more.
+fn draw(image: &mut GrayImage, column: usize, row: usize, panel: &[f32]) {
     let zoom = if row < 3 { 2 } else { 4 };
     let first = (PANEL - PANEL / zoom) / 2;
     for i in 0..PANEL * PANEL {
         let (x, y) = (i % PANEL, i / PANEL);
         let light = panel[(first + y / zoom) * PANEL + first + x / zoom];
         let at = ((row * PANEL + y) * 4 + column) * PANEL + x;
-        picture.as_mut()[at] = (light * 200.0 + 0.5).clamp(0.0, 255.0) as u8;
+        image.as_mut()[at] = (light * 200.0 + 0.5).clamp(0.0, 255.0) as u8;
     }
 }

@@ -9,31 +9,30 @@ use crate::grid::{SIDES, signed};
 use crate::microscope::distance;
 use crate::pupil::{Pupil, RIM, turn};
 
-/// Where the condenser's light comes from.
+/// Directions of the condenser's light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Source {
-    /// So many directions, 1 to 65 536, spread over the aperture like the seeds of a sunflower. The
-    /// number must grow with depth.
+    /// Equal-area directions over the aperture on Vogel's spiral. More defocus needs more points.
     Vogel {
-        /// How many.
+        /// Number of directions, 1 to 65 536.
         points: usize,
     },
-    /// The directions on the lattice of the FFT, or every `stride`-th in x and y: with 1 all
-    /// that the grid can tell apart.
+    /// Directions on the frequency lattice of the FFT, or every `stride`-th in x and y. A stride of 1 gives every
+    /// direction that the grid resolves.
     Lattice {
-        /// 1 to 32 768.
+        /// Stride in x and y, 1 to 32 768.
         stride: usize,
     },
-    /// One direction, along the axis: the coherent image.
+    /// One direction along the optical axis: coherent illumination.
     Axis,
 }
 
-/// The grid of [`Abbe`], and its source.
+/// Parameters of [`Abbe`]: grid and source.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AbbeParams {
-    /// Samples of the object from left to right, 1 to 32 768. Default 512, ours.
+    /// Width of the object in samples, 1 to 32 768. Default 512, ours.
     pub width: usize,
-    /// Samples from top to bottom, 1 to 32 768. Default 512, ours.
+    /// Height of the object in samples, 1 to 32 768. Default 512, ours.
     pub height: usize,
     /// Directions of light. Default 64 Vogel points, ours.
     pub source: Source,
@@ -45,7 +44,7 @@ impl Default for AbbeParams {
     }
 }
 
-/// What light meets at one depth: the complex amplitude √T · exp(iφ) that each sample lets through.
+/// A thin layer of the object at one depth: the complex amplitude transmittance √T · exp(iφ) of each sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layer {
     depth_um: f64,
@@ -53,8 +52,8 @@ pub struct Layer {
 }
 
 impl Layer {
-    /// A layer of complex amplitudes, real and imaginary part, at a depth about the focal plane when the stage has not
-    /// moved, positive towards the objective.
+    /// Creates a layer of complex amplitude transmittances, as real and imaginary parts. `depth_um` is the distance
+    /// from the focal plane with the stage at rest, positive towards the objective.
     ///
     /// # Errors
     ///
@@ -63,19 +62,19 @@ impl Layer {
         Ok(Self { depth_um: distance("depth_um", depth_um)?, amplitude })
     }
 
-    /// A layer of decadic absorbance A that delays light by φ radians, or does not if that slice is empty: amplitudes
-    /// 10^(−A/2) exp(iφ) (Eq. 11's transmittance).
+    /// Creates a layer from decadic absorbance A and phase delay φ in radians: amplitudes 10^(−A/2) exp(iφ) (Eq. 11's
+    /// transmittance). An empty `phase_rad` means no phase delay.
     ///
     /// # Errors
     ///
-    /// As [`Layer::new`].
+    /// See [`Layer::new`].
     ///
     /// # Panics
     ///
     /// If the slices differ in length.
-    pub fn refracting(depth_um: f64, absorbance: &[f32], phase_rad: &[f32]) -> Result<Self, Error> {
+    pub fn from_absorbance(depth_um: f64, absorbance: &[f32], phase_rad: &[f32]) -> Result<Self, Error> {
         let same = phase_rad.is_empty() || phase_rad.len() == absorbance.len();
-        assert!(same, "absorbance and phase differ in size");
+        assert!(same, "absorbance and phase must have the same length");
         let phases = phase_rad.iter().copied().chain(core::iter::repeat(0.0));
         let amplitude = absorbance.iter().zip(phases).map(|(&a, phase)| {
             let (size, (cos, sin)) = (libm::exp10(-0.5 * f64::from(a)), turn(f64::from(phase) / TAU));
@@ -85,21 +84,20 @@ impl Layer {
     }
 }
 
-/// Image formation from first principles: Abbe's integration over the source, light carried from
-/// layer to layer (multislice).
+/// Image formation from first principles: Abbe's integration over the source, with multislice propagation between
+/// layers.
 ///
-/// Each direction s of the condenser gives a coherent image, and their intensities add:
-/// I(x) = ∑ₛ |IFFT[T(f) P(f + s)]|² / ∑ₛ |P(s)|², with T the spectrum of the amplitude that leaves
-/// the uppermost layer; from a layer to the next it is carried by exp 2πi Δz γ_n(f + s). That is an
-/// FFT a direction and two more for each further layer; [`BrightField`](crate::BrightField) is
-/// measured against it. The grid is periodic: what leaves on one side comes back on the other.
+/// Each direction s of the condenser gives a coherent image, and their intensities add: I(x) = ∑ₛ |IFFT[T(f) P(f +
+/// s)]|² / ∑ₛ |P(s)|². T is the spectrum of the amplitude behind the uppermost layer. Propagation between layers
+/// multiplies the spectrum by exp 2πi Δz γ_n(f + s). The cost is one FFT per direction and two more per further layer.
+/// [`BrightField`](crate::BrightField) is tested against this type. The grid is periodic.
 #[derive(Debug, Clone)]
 pub struct Abbe {
     microscope: Microscope,
     params: AbbeParams,
 }
 
-/// A complex image and its spectrum, which lies column after column.
+/// A complex image and its spectrum, in column-major order.
 struct Plane {
     plan: ComplexPlane<f64, 8>,
     field: Vec<Complex64>,
@@ -108,7 +106,7 @@ struct Plane {
 }
 
 impl Abbe {
-    /// Checks the grid, whose samples lie [`Microscope::pitch_um`] apart.
+    /// Creates the integration from validated parameters. Samples are [`Microscope::pitch_um`] apart.
     ///
     /// # Errors
     ///
@@ -127,15 +125,17 @@ impl Abbe {
         Ok(Self { microscope: microscope.clone(), params: params.clone() })
     }
 
-    /// How many coherent images make one image.
+    /// Returns the number of coherent images per image.
     #[must_use]
     pub fn directions(&self) -> usize {
         self.microscope.bands().into_iter().map(|(wavelength, _)| self.directions_of(wavelength).len()).sum()
     }
 
-    /// The intensity of `layers` relative to that of empty slide, after a travel of the stage (see
-    /// [`Microscope::transfer`]); in double precision, as it serves as a reference, and without
-    /// stray light. Layers may come in any order: light meets the deepest first.
+    /// Returns the intensity image of `layers` relative to an empty slide, at a stage position (see
+    /// [`Microscope::transfer`]).
+    ///
+    /// The image is a reference in double precision, without stray light. Layers may be in any order; light passes the
+    /// deepest first.
     ///
     /// # Errors
     ///
@@ -143,12 +143,12 @@ impl Abbe {
     ///
     /// # Panics
     ///
-    /// If a layer has not as many samples as the grid.
+    /// If the number of samples of a layer differs from that of the grid.
     pub fn image(&self, layers: &[Layer], stage_um: f64) -> Result<Vec<f64>, Error> {
         distance("stage_um", stage_um)?;
         let samples = self.params.width * self.params.height;
         for layer in layers {
-            assert_eq!(layer.amplitude.len(), samples, "a layer has other samples than the grid");
+            assert_eq!(layer.amplitude.len(), samples, "each layer must have as many samples as the grid");
         }
         let mut layers: Vec<&Layer> = layers.iter().collect();
         layers.sort_by(|a, b| a.depth_um.total_cmp(&b.depth_um));
@@ -168,7 +168,7 @@ impl Abbe {
         Ok(image)
     }
 
-    /// Adds the images of one colour, by its wavelength and weight.
+    /// Adds the image of one wavelength with its weight.
     fn add(
         &self,
         (wavelength_um, weight): (f64, f64),
@@ -186,7 +186,7 @@ impl Abbe {
         let square = |f: [f64; 2]| f[0] * f[0] + f[1] * f[1];
         let directions = self.directions_of(wavelength_um);
         let passing = directions.iter().filter(|&&s| lens.passes(square(s))).count();
-        let share = weight / passing as f64;
+        let scale = weight / passing as f64;
         let travelling = params.mount_index / wavelength_um;
         let samples = image.len() as f64;
         for s in directions {
@@ -200,15 +200,15 @@ impl Abbe {
                 plane.plan.forward(&plane.field, &mut plane.spectrum, &mut plane.scratch);
             }
             self.filter(plane, s, lens.objective + RIM, |f| lens.passes(square(f)).then(|| lens.waves(f)));
-            let share = share / (samples * samples);
+            let scale = scale / (samples * samples);
             for (sum, value) in image.iter_mut().zip(&plane.field) {
-                *sum += share * value.norm_sqr();
+                *sum += scale * value.norm_sqr();
             }
         }
     }
 
-    /// From the spectrum of an envelope, light from direction `s`, to the field after it passed
-    /// through exp 2πi of `waves` at f + s; what has none does not pass, nor what is beyond `reach`.
+    /// Propagates the spectrum of an envelope, illuminated from direction `s`, by exp 2πi · `waves` at f + s, and
+    /// transforms it to the field. Frequencies beyond `reach` or without `waves` are blocked.
     fn filter(&self, plane: &mut Plane, s: [f64; 2], reach: f64, waves: impl Fn([f64; 2]) -> Option<f64>) {
         let (width, height) = (self.params.width, self.params.height);
         let pitch = self.microscope.pitch_um();
@@ -229,7 +229,7 @@ impl Abbe {
         plane.plan.inverse(&plane.spectrum, is_dark, &mut plane.field, &mut plane.scratch);
     }
 
-    /// Directions of light, cycles/µm.
+    /// Returns the directions of light, in cycles/µm.
     fn directions_of(&self, wavelength_um: f64) -> Vec<[f64; 2]> {
         let pitch = self.microscope.pitch_um();
         let steps = [self.params.width, self.params.height].map(|side| 1.0 / (side as f64 * pitch));
@@ -253,9 +253,9 @@ fn sunflower(points: usize, radius: f64) -> Vec<[f64; 2]> {
     (0..points).map(seed).collect()
 }
 
-/// Points of a lattice in a disc around one of them.
+/// Returns the points of a lattice inside a disc centred at a lattice point.
 fn lattice([dx, dy]: [f64; 2], radius: f64) -> Vec<[f64; 2]> {
-    #[expect(clippy::cast_possible_truncation, reason = "at most half the lattice of a grid")]
+    #[expect(clippy::cast_possible_truncation, reason = "at most half the grid size")]
     let [nx, ny] = [dx, dy].map(|step| (radius / step) as i32 + 1);
     let points = (-ny..=ny).flat_map(|j| (-nx..=nx).map(move |i| [f64::from(i) * dx, f64::from(j) * dy]));
     points.filter(|[x, y]| x * x + y * y <= radius * radius * (1.0 + RIM)).collect()

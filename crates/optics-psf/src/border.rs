@@ -1,18 +1,17 @@
-/// What lies outside an image.
+/// Border mode: values outside of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Border {
-    /// Nothing: `0 0 | a b c | 0 0`. Right for an object alone in its tile.
+    /// Zeros: `0 0 | a b c | 0 0`. For an object alone in its tile.
     Zero,
-    /// The image, mirrored in its edge: `b a | a b c | c b`. A constant stays constant and the sum
-    /// stays the sum, whatever the width of the blur: what leaves over the edge comes back.
+    /// Mirrored at the edge: `b a | a b c | c b`. Constants and the sum of the image are preserved at every blur width.
     #[default]
     Reflect,
-    /// The pixel at the edge, for ever: `a a | a b c | c c`. A constant stays constant.
+    /// Edge pixel repeated: `a a | a b c | c c`. Constants are preserved.
     Replicate,
 }
 
 impl Border {
-    /// The index in `0..len` that stands for `index`; none where the border holds nothing.
+    /// Returns the index in `0..len` of the pixel that `index` maps to, or `None` for a zero.
     pub(crate) fn source(self, index: isize, len: usize) -> Option<usize> {
         if let Some(inside) = usize::try_from(index).ok().filter(|&i| i < len) {
             return Some(inside);
@@ -27,8 +26,7 @@ impl Border {
         }
     }
 
-    /// Rows of `len` pixels from index `start` on, which may lie before or beyond them, as long as `line`, which holds them
-    /// one after the other.
+    /// Prepares extended rows: `line.len()` pixels from index `start` of rows of `len` pixels. `start` may be negative.
     pub(crate) fn extension(self, len: usize, start: isize, line: &mut [f32]) -> Extension<'_> {
         let before = usize::try_from(-start).unwrap_or(0).min(line.len());
         let skipped = usize::try_from(start).unwrap_or(0).min(len);
@@ -39,12 +37,12 @@ impl Border {
     }
 }
 
-/// Rows and what surrounds them.
+/// A row buffer with extrapolated values.
 pub(crate) struct Extension<'a> {
     border: Border,
     start: isize,
     line: &'a mut [f32],
-    /// Places before the row, pixels of it that are left out, and pixels that are not.
+    /// Pixels before the row, skipped pixels of the row, and copied pixels.
     before: usize,
     skipped: usize,
     inside: usize,
@@ -54,7 +52,7 @@ impl Extension<'_> {
     pub(crate) fn of(&mut self, row: &[f32]) -> &[f32] {
         let inside = self.before..self.before + self.inside;
         self.line[inside.clone()].copy_from_slice(&row[self.skipped..self.skipped + self.inside]);
-        // Where the border holds nothing, nothing was there before.
+        // Zeros outside of the row are already set.
         if self.border != Border::Zero {
             for i in (0..inside.start).chain(inside.end..self.line.len()) {
                 let source = self.border.source(self.start + i.cast_signed(), row.len());

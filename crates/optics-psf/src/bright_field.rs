@@ -1,29 +1,27 @@
-use crate::canvas::{Canvas, Samples, Spectra, absorbed, absorbed_of, amplitude_of, is_lit};
+use crate::canvas::{Canvas, Samples, Spectra, absorbed, absorbed_of, amplitude_of, is_nonzero};
 use crate::error::{Error, require, within};
 use crate::filter::{Filter, Lattice};
 use crate::grid::{SIDES, fast_length};
 use crate::lane_plane::{LanePlans, LaneScratch, Lanes};
-use crate::light::{lift, mean_of_pixels};
+use crate::light::{add_stray_light, mean_of_pixels};
 use crate::microscope::distance;
 use crate::{Microscope, Transfer};
 
-/// Which object, cut into slabs, [`BrightField`] images, and at which planes.
+/// Parameters of [`BrightField`]: the grid, the depths of the object's slabs, and the stage positions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BrightFieldParams {
-    /// Samples of the object from left to right, a multiple of [`oversampling`], to 32 768. Default
-    /// 512, ours.
+    /// Width of the object in samples, a multiple of [`oversampling`], up to 32 768. Default 512, ours.
     ///
     /// [`oversampling`]: crate::MicroscopeParams::oversampling
     pub width: usize,
-    /// Samples from top to bottom, likewise. Default 512, ours.
+    /// Height of the object in samples, a multiple of the oversampling, up to 32 768. Default 512, ours.
     pub height: usize,
-    /// What lies outside. Default 64 samples of empty slide, ours.
+    /// Surroundings of the object. Default 64 samples of empty slide, ours.
     pub padding: Padding,
-    /// Depths of the slabs about the focal plane of the stage at rest, positive towards the objective, each −1000 to
-    /// 1000 µm, as for [`Microscope::transfer`]. Default one at 0, ours.
+    /// Depths of the slabs relative to the focal plane with the stage at rest, in µm, positive towards the objective,
+    /// −1000 to 1000 (see [`Microscope::transfer`]). Default one slab at 0, ours.
     pub depths_um: Vec<f64>,
-    /// Travels of the stage at which pictures are taken, each −1000 to 1000 µm. Default one at 0,
-    /// ours.
+    /// Stage positions of the images, in µm, positive when lowered, −1000 to 1000. Default one at 0, ours.
     pub stages_um: Vec<f64>,
 }
 
@@ -33,50 +31,45 @@ impl Default for BrightFieldParams {
     }
 }
 
-/// What lies outside of the object.
+/// Surroundings of the object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Padding {
-    /// The object again: its left edge continues its right one. Sides with large prime factors are
-    /// slow.
+    /// Periodic continuation of the object. Sizes with large prime factors are slow.
     Periodic,
-    /// Empty slide, at least so many samples of it, 0 to 16 384, between opposite edges.
+    /// Empty slide of at least `px` samples, 0 to 16 384, between opposite edges.
     Clear {
-        /// How many: less than twice the width of the blur lets light come in from the other side.
+        /// Number of samples. Values below twice the blur width allow wrap-around.
         px: usize,
     },
 }
 
-/// Bright field: the image as a product of filtered transmittances, one factor for each slab of the
-/// object.
+/// Bright-field imaging: the image is a product of filtered transmittances, one factor per slab of the object.
 ///
 /// I = ∏ⱼ (W_z ⊗ 10^(−A) + G_z ⊗ [(1 − W₀ ⊗ a)² − W₀ ⊗ 10^(−A)]) · exp(−2 ∑ⱼ H_P ⊗ φ)
 ///
-/// for slabs of absorbance A and phase φ at distance z from focus, a = 1 − 10^(−A/2). W is the
-/// transfer function H_A of [`Microscope::transfer`]: what light transmits, and not the absorbance,
-/// is what a lens blurs linearly. In focus the bracket makes it (1 − W₀ ⊗ a)², the square of the
-/// blurred amplitude; G_z is the disc that the condenser's cone cuts out of the plane in focus, and
-/// the bracket fades out from 1 to 2 µm. Against [`Abbe`](crate::Abbe) the error is 1 % of the
-/// contrast for one slab and 2 % for two that overlap.
+/// for slabs of absorbance A and phase delay φ at distance z from focus, with a = 1 − 10^(−A/2). W is the transfer
+/// function H_A of [`Microscope::transfer`]: a lens blurs transmittance linearly, not absorbance. In focus the bracket
+/// turns the factor into (1 − W₀ ⊗ a)², the square of the blurred amplitude. G_z is the disc of the condenser's cone in
+/// the focal plane; the bracket fades out from 1 to 2 µm. The error against [`Abbe`](crate::Abbe) is 1 % of the
+/// contrast for one slab and 2 % for two overlapping slabs.
 ///
-/// Filters are computed once, here; a [`Specimen`] holds what is on the slide, and each picture of
-/// it then costs one inverse FFT for each slab that is not empty. Slabs from 2 µm of defocus on are computed as the
-/// mean over each pixel of the camera, if little is left there of detail finer than the pixels. What is then lost are
-/// details that two slabs have in common within one pixel, below 0.1 % of the contrast; with an oversampling of 1
-/// there are no such details.
-/// The paper's Gaussians (Eqs. 11 to 14, [`Gaussian`](crate::Gaussian)) are 8 to 87 % off where this is 1 % off.
+/// `BrightField` computes its filters once. A [`Specimen`] holds the object; each image then costs one inverse FFT per
+/// non-empty slab. Slabs with at least 2 µm of defocus are computed at camera pixels, if little detail finer than
+/// pixels remains. This loses products of sub-pixel detail of two slabs, below 0.1 % of the contrast, and nothing at an
+/// oversampling of 1. The paper's Gaussians (Eqs. 11 to 14, [`Gaussian`](crate::Gaussian)) have errors of 8 to 87 %
+/// where this model has 1 %.
 #[derive(Debug)]
 pub struct BrightField {
     microscope: Microscope,
     size: [usize; 2],
     canvas: Canvas,
     in_focus: Filter,
-    /// For each plane, the filters of the slabs.
+    /// Filters of each slab, per stage position.
     planes: Vec<Vec<Filter>>,
 }
 
-/// What is on the slide, slab by slab, as the spectra of what it absorbs and delays. It is made by
-/// [`BrightField::specimen`], belongs to that, and is also its working memory: with the same one,
-/// nothing is allocated after the first object and picture.
+/// The object: spectra of absorption and phase delay of each slab. [`BrightField::specimen`] creates it for one
+/// `BrightField`. It also holds working memory: after the first image, nothing is allocated.
 #[derive(Debug, Clone, Default)]
 pub struct Specimen {
     slabs: Vec<Spectra>,
@@ -85,7 +78,7 @@ pub struct Specimen {
 }
 
 impl Specimen {
-    /// Empties the slide.
+    /// Clears all slabs.
     pub fn clear(&mut self) {
         self.slabs.iter_mut().for_each(Spectra::clear);
     }
@@ -96,8 +89,8 @@ impl BrightField {
     ///
     /// # Errors
     ///
-    /// If a side or the padding is out of range or a side no multiple of the oversampling; if
-    /// a depth or a travel of the stage is out of range.
+    /// If a size or the padding is out of range, a size is not a multiple of the oversampling, or a depth or stage
+    /// position is out of range.
     pub fn new(microscope: &Microscope, params: &BrightFieldParams) -> Result<Self, Error> {
         let oversampling = microscope.params().oversampling;
         let side = |field, value: usize| {
@@ -128,46 +121,45 @@ impl BrightField {
         })
     }
 
-    /// An empty slide.
+    /// Returns an empty specimen.
     #[must_use]
     pub fn specimen(&self) -> Specimen {
         let slabs = self.planes.first().map_or(0, Vec::len);
         Specimen { slabs: vec![Spectra::default(); slabs], ..Specimen::default() }
     }
 
-    /// Width and height of a picture in pixels of the camera.
+    /// Returns the width and height of an image in camera pixels.
     #[must_use]
     pub fn image_size(&self) -> [usize; 2] {
         self.size.map(|side| side / self.microscope.params().oversampling)
     }
 
-    /// Puts decadic absorbances, 0 or more, into a slab in place of what was there; its phase stays.
+    /// Sets the decadic absorbance, at least 0, of a slab. Its phase delay is kept.
     ///
     /// # Panics
     ///
-    /// If there is no such slab, or the slice has not as many samples as the object.
+    /// If the slab does not exist, or the number of samples differs from that of the object.
     pub fn set_absorbance(&self, specimen: &mut Specimen, slab: usize, absorbance: &[f32]) {
         self.set_absorbed(specimen, slab, absorbance, 0.0, absorbed);
     }
 
-    /// Puts transmittances, 0 to 1, into a slab in place of what was there; its phase stays.
+    /// Sets the transmittance, 0 to 1, of a slab. Its phase delay is kept.
     ///
     /// # Panics
     ///
-    /// As [`BrightField::set_absorbance`].
+    /// See [`BrightField::set_absorbance`].
     pub fn set_transmittance(&self, specimen: &mut Specimen, slab: usize, transmittance: &[f32]) {
         self.set_absorbed(specimen, slab, transmittance, 1.0, absorbed_of);
     }
 
-    /// Puts phases, by how many radians light is late, into a slab in place of those that were
-    /// there; what it absorbs stays.
+    /// Sets the phase delay of a slab, in radians. Its absorption is kept.
     ///
     /// # Panics
     ///
-    /// As [`BrightField::set_absorbance`].
+    /// See [`BrightField::set_absorbance`].
     pub fn set_phase(&self, specimen: &mut Specimen, slab: usize, phase_rad: &[f32]) {
         let Specimen { slabs, scratch, .. } = specimen;
-        self.transform(phase_rad, 0.0, &mut slabs[slab].phase, scratch, is_lit);
+        self.transform(phase_rad, 0.0, &mut slabs[slab].phase, scratch, is_nonzero);
     }
 
     fn set_absorbed(
@@ -187,7 +179,7 @@ impl BrightField {
         }
     }
 
-    /// The spectrum of what `map` makes of samples; none if all are empty, as the background is.
+    /// Computes the spectrum of `map(samples)`, or an empty one if all samples equal the background.
     fn transform(
         &self,
         samples: &[f32],
@@ -197,16 +189,16 @@ impl BrightField {
         map: impl Fn(&mut [f32]) -> bool,
     ) {
         let [width, height] = self.size;
-        assert_eq!(samples.len(), width * height, "a slab has other samples than the object");
+        assert_eq!(samples.len(), width * height, "a slab must have as many samples as the object");
         self.canvas.transform(Samples { samples, width, offset: 0, background }, map, spectrum, scratch);
     }
 
-    /// The picture of a plane: the light of each pixel of the camera relative to that of empty slide, stray
-    /// light included.
+    /// Returns the image at a stage position: the intensity at each camera pixel relative to an empty slide, including
+    /// stray light.
     ///
     /// # Panics
     ///
-    /// If there is no such plane, or the specimen is another's.
+    /// If the plane does not exist, or the specimen belongs to another `BrightField`.
     #[must_use]
     pub fn image(&self, specimen: &mut Specimen, plane: usize) -> Vec<f32> {
         let mut out = vec![0.0; self.image_size().into_iter().product()];
@@ -214,19 +206,19 @@ impl BrightField {
         out
     }
 
-    /// The picture of a plane, into `out`. Gives the number of places where a slab would have let
-    /// less than [`LEAST_LIGHT`](crate::LEAST_LIGHT) through, in pixels of the camera.
+    /// Writes the image at a stage position to `out`. Returns the number of values clipped at
+    /// [`MIN_TRANSMITTANCE`](crate::MIN_TRANSMITTANCE), in camera pixels.
     ///
     /// # Panics
     ///
-    /// If there is no such plane, the specimen is another's, or `out` has not
-    /// [as many pixels](Self::image_size).
+    /// If the plane does not exist, the specimen belongs to another `BrightField`, or `out` does not have
+    /// [`image_size`](Self::image_size) pixels.
     pub fn image_into(&self, specimen: &mut Specimen, plane: usize, out: &mut [f32]) -> usize {
         let [image_width, image_height] = self.image_size();
-        assert_eq!(out.len(), image_width * image_height, "the picture has another size");
+        assert_eq!(out.len(), image_width * image_height, "`out` must have as many pixels as the image");
         let Specimen { slabs, scratch, product } = specimen;
         let filters = &self.planes[plane];
-        assert_eq!(slabs.len(), filters.len(), "the specimen has other slabs");
+        assert_eq!(slabs.len(), filters.len(), "the specimen belongs to another BrightField");
         for (slab, filter) in slabs.iter_mut().zip(filters) {
             if filter.is_corrected {
                 self.canvas.correct(&self.in_focus, slab, scratch);
@@ -234,22 +226,23 @@ impl BrightField {
         }
         let oversampling = self.microscope.params().oversampling;
         let [width, height] = self.size;
-        let mut floored = 0;
+        let mut clipped = 0;
         out.fill(1.0);
         let on_object = |(slab, filter): (&Spectra, &Filter)| filter.lattice == Lattice::Object && !slab.is_empty();
         if slabs.iter().zip(filters).any(on_object) {
             product.clear();
             product.resize(width * height, 1.0);
             let samples = self.expose(Lattice::Object, slabs, filters, product, width, scratch);
-            floored = samples.div_ceil(oversampling * oversampling);
+            clipped = samples.div_ceil(oversampling * oversampling);
             mean_of_pixels(product, width, oversampling, out);
         }
-        floored += self.expose(Lattice::Camera, slabs, filters, out, image_width, scratch);
-        lift(out, self.microscope.params().stray_light);
-        floored
+        clipped += self.expose(Lattice::Camera, slabs, filters, out, image_width, scratch);
+        add_stray_light(out, self.microscope.params().stray_light);
+        clipped
     }
 
-    /// Multiplies `product` by what the slabs that are computed on `lattice` let through.
+    /// Multiplies `product` by the transmittance of the slabs computed on `lattice`. Returns the number of clipped
+    /// values.
     fn expose(
         &self,
         lattice: Lattice,
@@ -262,11 +255,11 @@ impl BrightField {
         let here = || filters.iter().zip(slabs).filter(|(filter, _)| filter.lattice == lattice);
         let absorbing = here().filter(|(_, slab)| !slab.absorbed.is_empty());
         let transmit = |(filter, slab)| self.canvas.transmit::<false>(filter, slab, product, width, scratch);
-        let floored = absorbing.map(transmit).sum();
+        let clipped = absorbing.map(transmit).sum();
         let refracting = here().filter(|(_, slab)| !slab.phase.is_empty());
         if refracting.clone().next().is_some() {
             self.canvas.refract(lattice, refracting, product, width, scratch);
         }
-        floored
+        clipped
     }
 }

@@ -7,71 +7,71 @@ use crate::lane_plane::{LANES, LanePlane, LanePlans, LaneScratch, LaneSupport, L
 use crate::pupil::turn;
 use crate::transfer::Transfer;
 
-/// Least light that anything lets through: W ⊗ 10^(−A) undershoots to about −0.05 beside things of A > 1,
-/// and there is no negative light.
-pub const LEAST_LIGHT: f32 = 1e-3;
+/// Smallest transmittance of a factor. W ⊗ 10^(−A) undershoots to about −0.05 next to objects of A > 1; light cannot be
+/// negative.
+pub const MIN_TRANSMITTANCE: f32 = 1e-3;
 
-/// A periodic rectangle of the slide: the lattices on which what is in it is imaged.
+/// A periodic rectangle of the slide with its object and camera lattices.
 #[derive(Debug)]
 pub(crate) struct Canvas {
     object: Raster,
     camera: Raster,
-    /// Where what the microscope transfers is squared.
+    /// Grid on which blurred amplitudes are squared.
     squares: LanePlane,
-    /// Steps of the filters' tables from one frequency to the next along x.
+    /// Frequency step along x, in steps of the filters' tables.
     step_x: f32,
-    /// Frequencies along y in those steps, block by block.
+    /// Frequencies along y in these steps, per block.
     y: Vec<[f32; LANES]>,
-    /// What the mean over a pixel does to frequencies along x and y.
+    /// Transfer of the pixel mean along x and y.
     pixel: [PixelMean; 2],
 }
 
-/// A lattice, and its frequencies that the microscope transfers.
+/// A lattice and the frequencies that the microscope transfers.
 #[derive(Debug)]
 struct Raster {
     plane: LanePlane,
     support: LaneSupport,
 }
 
-/// What the mean over a pixel does to frequencies 0, 1, … of one axis.
+/// Transfer of the pixel mean at frequencies 0, 1, … of one axis.
 #[derive(Debug)]
 struct PixelMean {
-    /// Around the middle of the pixel.
+    /// Relative to the centre of the pixel.
     size: Vec<f32>,
-    /// From its first sample.
+    /// Relative to its first sample.
     moved: Vec<[f32; 2]>,
 }
 
 impl PixelMean {
-    /// Whole blocks of frequencies. The mean is (1/n) ∑ₖ exp 2πi f k over the samples of a pixel, f in cycles per sample:
-    /// around its middle, and from its first sample, k = 0 … n − 1.
-    #[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 spectra")]
+    /// Computes complete blocks of frequencies. The mean is (1/n) ∑ₖ exp 2πi f k over the samples of a pixel, with f in
+    /// cycles per sample: relative to its centre, and relative to its first sample, k = 0 … n − 1.
+    #[expect(clippy::cast_possible_truncation, reason = "spectra use single precision")]
     fn new(side: usize, n: usize) -> Self {
         let mean = |place: usize| {
             let f = place as f64 / side as f64;
-            let (mut middle, mut moved) = (0.0, [0.0; 2]);
+            let (mut centred, mut moved) = (0.0, [0.0; 2]);
             for k in 0..n {
                 let (c, s) = turn(f * k as f64);
                 moved = [moved[0] + c / n as f64, moved[1] + s / n as f64];
-                middle += turn(f * (k as f64 - 0.5 * (n - 1) as f64)).0 / n as f64;
+                centred += turn(f * (k as f64 - 0.5 * (n - 1) as f64)).0 / n as f64;
             }
-            (middle as f32, moved.map(|v| v as f32))
+            (centred as f32, moved.map(|v| v as f32))
         };
         let (size, moved) = (0..(side / 2 + 1).next_multiple_of(LANES)).map(mean).unzip();
         Self { size, moved }
     }
 }
 
-/// Spectra of what is at one depth; empty where there is nothing.
+/// Spectra of an object at one depth; empty vectors stand for zero.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Spectra {
-    /// Of 1 − 10^(−A).
+    /// Spectrum of 1 − 10^(−A).
     pub(crate) absorbed: Vec<Lanes>,
-    /// Of a = 1 − 10^(−A/2), if it is needed for the correction, and then of 1 − 10^(−A) − 2a.
+    /// Spectrum of a = 1 − 10^(−A/2) if the correction needs it; later of 1 − 10^(−A) − 2a.
     pub(crate) amplitude: Vec<Lanes>,
-    /// Of (1 − W₀ ⊗ a)² − W₀ ⊗ 10^(−A), once it was needed.
+    /// Spectrum of (1 − W₀ ⊗ a)² − W₀ ⊗ 10^(−A), computed on demand.
     pub(crate) correction: Vec<Lanes>,
-    /// Of φ.
+    /// Spectrum of φ.
     pub(crate) phase: Vec<Lanes>,
 }
 
@@ -92,13 +92,12 @@ impl Spectra {
     }
 }
 
-/// Samples for each period of the finest detail that is transferred, where that is squared. Three would keep all that is
-/// transferred of the square free of aliases; what comes in with fewer are products of two details both finer than
-/// 0.7 of the cutoff, of which hardly anything is left.
+/// Samples per period of the finest transferred detail on the grid for squares. Three would avoid all aliases. With
+/// fewer, products of two details finer than 0.7 of the cutoff alias; they are negligible.
 const SQUARED_CUTOFFS: f64 = 2.4;
 
 impl Canvas {
-    /// `size` in samples of the object, multiples of the oversampling.
+    /// Creates the lattices. `size` is in object samples, a multiple of the oversampling.
     pub(crate) fn new(microscope: &Microscope, size: [usize; 2], plans: &LanePlans) -> Self {
         let oversampling = microscope.params().oversampling;
         let pitch = microscope.pitch_um();
@@ -107,27 +106,27 @@ impl Canvas {
             let support = LaneSupport::new(width, height, microscope.cutoff() * pitch * stride as f64);
             Raster { plane: LanePlane::new(width, height, plans), support }
         };
-        // Three samples for four of the object's, if that is fine enough and comes out even.
+        // Three samples per four of the object's, if this is fine enough and the size is divisible.
         let is_fine = 0.75 >= SQUARED_CUTOFFS * microscope.cutoff() * pitch;
         let [width, height] = size.map(|side| if is_fine && side.is_multiple_of(4) { side / 4 * 3 } else { side });
         let steps = size.map(|side| 1.0 / (side as f64 * pitch * Transfer::step_of(microscope)));
         let object = raster(1);
-        #[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 tables")]
+        #[expect(clippy::cast_possible_truncation, reason = "tables use single precision")]
         let y = |block: usize| core::array::from_fn(|lane| (block * LANES + lane) as f32 * steps[1] as f32);
         Self {
             y: (0..object.support.blocks()).map(y).collect(),
             camera: raster(oversampling),
             squares: LanePlane::new(width, height, plans),
             object,
-            #[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 tables")]
+            #[expect(clippy::cast_possible_truncation, reason = "tables use single precision")]
             step_x: steps[0] as f32,
             pixel: size.map(|side| PixelMean::new(side, oversampling)),
         }
     }
 
-    /// The spectrum of an image on the object's lattice, or an empty one if the image is empty. It is what `map` makes of
-    /// rows of `width` samples, which lie `offset` samples from the left and the upper edge in `background`, and
-    /// 0 around them: `map` makes 0 of the background, and says whether it made anything else.
+    /// Computes the spectrum of an image on the object's lattice, or an empty one if the image is empty. `map` is
+    /// applied to rows of `width` samples, placed at `offset` from the left and upper edge in `background`. `map` must
+    /// return 0 for the background, and reports whether any value is not 0.
     pub(crate) fn transform(
         &self,
         image: Samples<'_>,
@@ -148,7 +147,7 @@ impl Canvas {
             let inside = &mut stripe[rows.clone()];
             for (stripe, row) in inside.iter_mut().zip(samples.chunks_exact(width)) {
                 let (line, row) = (stripe.as_flattened_mut(), &row[first - offset..end - offset]);
-                // Of a length that the compiler knows, almost always.
+                // Full stripes have a length known at compile time.
                 match (line.first_chunk_mut::<STRIPE>(), row.first_chunk::<STRIPE>()) {
                     (Some(line), Some(row)) => *line = *row,
                     _ => {
@@ -162,7 +161,7 @@ impl Canvas {
         plane.forward(support, fill, spectrum, scratch);
     }
 
-    /// Adds a block of a spectrum, times a response of a filter, to `sum`.
+    /// Adds a block of a spectrum times a response of a filter to `sum`.
     fn add(&self, (filter, part): (&Filter, Part), spectrum: &[Lanes], block: usize, reach: usize, sum: &mut [Lanes]) {
         let at = Block {
             step_x: self.step_x,
@@ -173,21 +172,21 @@ impl Canvas {
         filter.add(part, at, self.object.support.block(spectrum, block), reach, sum);
     }
 
-    /// The correction of the in-focus form, if that is not known yet. With 1 − T = 2a − a² it is
-    /// (1 − W₀ ⊗ a)² − W₀ ⊗ T = (W₀ ⊗ a)² + W₀ ⊗ (1 − T − 2a).
+    /// Computes the in-focus correction if it is missing. With 1 − T = 2a − a² it is (1 − W₀ ⊗ a)² − W₀ ⊗ T = (W₀ ⊗ a)²
+    /// + W₀ ⊗ (1 − T − 2a).
     pub(crate) fn correct(&self, in_focus: &Filter, spectra: &mut Spectra, scratch: &mut LaneScratch) {
         let Spectra { absorbed, amplitude, correction, .. } = spectra;
         if !correction.is_empty() || amplitude.is_empty() {
             return;
         }
         let Raster { plane, support } = &self.object;
-        // Of the picture, and of its spectrum, that of as many samples as the object has.
-        let (norm, share) = (plane.norm(), self.squares.norm() / plane.norm());
+        // Scales of the image, and of its spectrum at the object's number of samples.
+        let (norm, scale) = (plane.norm(), self.squares.norm() / plane.norm());
         let blurred = (in_focus, Part::Absorption);
         let fill = |block: usize, line: &mut [Lanes]| {
             self.add(blurred, amplitude, block, support.reach(block), line);
         };
-        let square = |stripe: &mut [Lanes]| squared(stripe.as_flattened_mut().as_flattened_mut(), norm, share);
+        let square = |stripe: &mut [Lanes]| squared(stripe.as_flattened_mut().as_flattened_mut(), norm, scale);
         self.squares.mapped(support, fill, square, correction, scratch);
         twice_less(amplitude.as_flattened_mut().as_flattened_mut(), absorbed.as_flattened().as_flattened());
         for block in 0..support.blocks() {
@@ -218,8 +217,8 @@ impl Canvas {
         plane.inverse(support, fill, columns, visit, scratch);
     }
 
-    /// Multiplies `product`, rows of `width`, by what one thing lets through, or makes it that if it is the first; gives
-    /// the number of values that were too low.
+    /// Multiplies `product`, in rows of `width`, by the transmittance of an object, or assigns it if `FIRST`. Returns
+    /// the number of clipped values.
     pub(crate) fn transmit<const FIRST: bool>(
         &self,
         filter: &Filter,
@@ -234,15 +233,15 @@ impl Canvas {
                 self.add((filter, Part::Correction), &spectra.correction, block, reach, line);
             }
         };
-        let (norm, mut floored) = (self.object.plane.norm(), 0);
+        let (norm, mut clipped) = (self.object.plane.norm(), 0);
         let visit = |left: usize, stripe: &[Lanes]| {
-            floored += transmit::<FIRST>(product, width, left, stripe, norm);
+            clipped += transmit::<FIRST>(product, width, left, stripe, norm);
         };
         self.invert(filter.lattice, add, width, visit, scratch);
-        floored
+        clipped
     }
 
-    /// Multiplies `product`, rows of `width`, by the light that the phases of all that is imaged on `lattice` move.
+    /// Multiplies `product`, in rows of `width`, by the effect of the phase delays of all objects on `lattice`.
     pub(crate) fn refract<'a>(
         &self,
         lattice: Lattice,
@@ -262,7 +261,7 @@ impl Canvas {
     }
 }
 
-/// Rows of samples in a canvas, with a margin of `offset` on the left and above.
+/// Rows of samples in a canvas, with a margin of `offset` at the left and at the top.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Samples<'a> {
     pub(crate) samples: &'a [f32],
@@ -272,14 +271,14 @@ pub(crate) struct Samples<'a> {
 }
 
 #[multiversion(targets = "simd")]
-fn squared(values: &mut [f32], norm: f32, share: f32) {
+fn squared(values: &mut [f32], norm: f32, scale: f32) {
     for value in values {
         let u = *value * norm;
-        *value = share * (u * u);
+        *value = scale * (u * u);
     }
 }
 
-/// Makes of a what 1 − T − 2a is.
+/// Replaces a by 1 − T − 2a.
 #[multiversion(targets = "simd")]
 fn twice_less(amplitude: &mut [f32], absorbed: &[f32]) {
     for (amplitude, absorbed) in amplitude.iter_mut().zip(absorbed) {
@@ -287,7 +286,7 @@ fn twice_less(amplitude: &mut [f32], absorbed: &[f32]) {
     }
 }
 
-/// Multiplies a block by what the mean over a pixel leaves of frequencies kx = 0 …, and … −1 at its end.
+/// Multiplies a block by the transfer of the pixel mean, for kx = 0 … and … −1 at its end.
 #[multiversion(targets = "simd")]
 fn mean_over_pixels(line: &mut [Lanes], x: &[[f32; 2]], y: &[[f32; 2]; LANES]) {
     let (y_re, y_im) = (y.map(|y| y[0]), y.map(|y| y[1]));
@@ -311,23 +310,23 @@ fn turn_lanes(values: &mut Lanes, x: [f32; 2], y_re: &[f32; LANES], y_im: &[f32;
     }
 }
 
-/// Multiplies a stripe of the columns of `product`, rows of `width`, by 1 − lost light, or makes it that; gives the number of
-/// values that were too low.
+/// Multiplies a stripe of columns of `product`, in rows of `width`, by 1 − absorbed light, or assigns it if `FIRST`.
+/// Returns the number of clipped values.
 #[multiversion(targets = "simd")]
 fn transmit<const FIRST: bool>(product: &mut [f32], width: usize, left: usize, lost: &[Lanes], norm: f32) -> usize {
-    let mut floored = 0_u32;
+    let mut clipped = 0_u32;
     for (row, lost) in product.chunks_exact_mut(width).zip(lost) {
         for (product, lost) in row[left..].iter_mut().zip(lost.as_flattened()) {
             let light = 1.0 - lost * norm;
-            floored += u32::from(light < LEAST_LIGHT);
-            let light = light.max(LEAST_LIGHT);
+            clipped += u32::from(light < MIN_TRANSMITTANCE);
+            let light = light.max(MIN_TRANSMITTANCE);
             *product = if FIRST { light } else { *product * light };
         }
     }
-    floored as usize
+    clipped as usize
 }
 
-/// Multiplies a stripe likewise by exp(factor · v).
+/// Multiplies a stripe by exp(factor · v).
 #[multiversion(targets = "simd")]
 fn delay(product: &mut [f32], width: usize, left: usize, phases: &[Lanes], factor: f32) {
     for (row, phases) in product.chunks_exact_mut(width).zip(phases) {
@@ -337,53 +336,53 @@ fn delay(product: &mut [f32], width: usize, left: usize, phases: &[Lanes], facto
     }
 }
 
-/// From 1 − T to 1 − √T.
+/// Converts 1 − T to 1 − √T.
 #[multiversion(targets = "simd")]
 fn amplitude(line: &mut [f32]) {
     for v in line {
-        // (1 − T)/(1 + √T) keeps the digits of little absorption.
+        // (1 − T)/(1 + √T) is accurate for small absorption.
         *v /= 1.0 + (1.0 - *v).max(0.0).sqrt();
     }
 }
 
-/// From absorbance A to 1 − T = 1 − 10^(−A) (Eq. 11); says whether there is anything.
+/// Converts absorbance A to 1 − T = 1 − 10^(−A) (Eq. 11). Returns whether any value is not 0.
 #[multiversion(targets = "simd")]
 pub(crate) fn absorbed(values: &mut [f32]) -> bool {
-    let lit = is_lit(values);
-    if lit {
+    let nonzero = is_nonzero(values);
+    if nonzero {
         for value in values {
             *value = 1.0 - exp_f32(-*value * core::f32::consts::LN_10);
         }
     }
-    lit
+    nonzero
 }
 
-/// From T to 1 − T, likewise.
+/// Converts T to 1 − T. Returns whether any value is not 0.
 #[multiversion(targets = "simd")]
 pub(crate) fn absorbed_of(values: &mut [f32]) -> bool {
-    let mut lit = 0_u32;
+    let mut nonzero = 0_u32;
     for value in values {
         *value = 1.0 - *value;
-        lit |= value.to_bits();
+        nonzero |= value.to_bits();
     }
-    lit != 0
+    nonzero != 0
 }
 
-/// To 1 − √T, likewise, from what `absorbed` makes 1 − T of.
+/// Returns a conversion to 1 − √T, from one to 1 − T.
 pub(crate) fn amplitude_of(absorbed: impl Fn(&mut [f32]) -> bool) -> impl Fn(&mut [f32]) -> bool {
     move |values| {
-        let lit = absorbed(values);
-        if lit {
+        let nonzero = absorbed(values);
+        if nonzero {
             amplitude(values);
         }
-        lit
+        nonzero
     }
 }
 
-/// Whether there is anything.
+/// Returns whether any value is not 0.
 #[multiversion(targets = "simd")]
-pub(crate) fn is_lit(values: &mut [f32]) -> bool {
-    values.iter().fold(0, |lit, value| lit | (value.to_bits() << 1)) != 0
+pub(crate) fn is_nonzero(values: &mut [f32]) -> bool {
+    values.iter().fold(0, |nonzero, value| nonzero | (value.to_bits() << 1)) != 0
 }
 
 #[cfg(test)]
@@ -392,7 +391,7 @@ mod tests {
     use crate::MicroscopeParams;
 
     #[test]
-    fn squares_need_fewer_samples() {
+    fn squares_on_a_coarser_grid_are_accurate() {
         for (na, condenser_na) in [(0.95, 0.41), (0.65, 0.65), (0.9, 0.3)] {
             let params = MicroscopeParams { na, condenser_na, ..MicroscopeParams::default() };
             let (microscope, plans) = (Microscope::new(&params).unwrap(), LanePlans::default());
@@ -400,7 +399,7 @@ mod tests {
             let mut full = Canvas::new(&microscope, [240, 192], &plans);
             assert_eq!(sparse.squares.width, 180);
             full.squares = full.object.plane.clone();
-            // Sharp and nearly black: a disc, a bar and specks of one sample.
+            // Sharp and nearly opaque: a disc, a bar and specks of one sample.
             let (width, height) = (160, 120);
             let sample = |i: usize| {
                 let (x, y) = (i % width, i / width);

@@ -2,58 +2,59 @@ use core::ops::RangeInclusive;
 
 use thiserror::Error;
 
-/// Why parameters were refused.
+/// Error of invalid parameters or images.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// One number lies outside the range its field allows.
+    /// A number is out of range.
     #[error("{field} is {value}; it must be {accepted}")]
     OutOfRange {
         /// Name of the field or argument.
         field: &'static str,
-        /// What it held.
+        /// The rejected value.
         value: f64,
-        /// What would be accepted.
+        /// Description of the accepted values.
         accepted: &'static str,
     },
-    /// A window reaches beyond the image, or is too small.
+    /// A window exceeds the image or is too small.
     #[error(
-        "the window ({window:?}) must lie inside the image of {width} x {height} pixels and be at least {least} pixels wide and high"
+        "invalid window ({window:?}): it must lie inside the image of {width} x {height} pixels and be at least \
+         {min_side} pixels wide and high"
     )]
     Window {
-        /// Which window.
+        /// The window.
         window: crate::window::Window,
         /// Width of the image.
         width: usize,
         /// Height of the image.
         height: usize,
-        /// Least side.
-        least: usize,
+        /// Smallest width and height.
+        min_side: usize,
     },
     /// The sharpest plane of a stack is its first or last.
     #[error(
-        "the sharpest of {planes} planes is number {sharpest}, the stack's end; it must have planes on both sides of focus"
+        "the sharpest of {planes} planes is number {sharpest}, the stack's end: take planes on both sides of focus"
     )]
-    NoFocusInside {
-        /// Which plane, counted from 0.
+    FocusAtStackEnd {
+        /// Index of the sharpest plane, from 0.
         sharpest: usize,
-        /// How many there are.
+        /// Number of planes.
         planes: usize,
     },
-    /// There is nothing in a window to be measured.
-    #[error("the window holds no {thing} to measure")]
-    Nothing {
-        /// What was looked for.
-        thing: &'static str,
+    /// A window contains nothing measurable.
+    #[error("the window holds no {what} to measure")]
+    NothingToMeasure {
+        /// The missing structure.
+        what: &'static str,
     },
 }
 
-/// `value`, if it is finite and `holds`.
+/// Returns `value` if it is finite and `holds` is true.
 pub(crate) fn require(field: &'static str, value: f64, holds: bool, accepted: &'static str) -> Result<f64, Error> {
     if value.is_finite() && holds { Ok(value) } else { Err(Error::OutOfRange { field, value, accepted }) }
 }
 
-/// `value`, if it lies in a range.
+/// Returns `value` if it is in `range`.
 pub(crate) fn within(
     field: &'static str,
     value: f64,

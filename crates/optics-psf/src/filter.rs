@@ -5,107 +5,108 @@ use num_complex::Complex32;
 
 use crate::Microscope;
 use crate::lane_plane::{LANES, Lanes};
-use crate::transfer::{SIDED_SAMPLES, Transfer, corners, fade};
+use crate::transfer::{ASYMMETRIC_SAMPLES, Transfer, corners, fade};
 
-/// Up to this distance from focus, and from that one on, µm of mountant: the correction of the in-focus form is whole, and
-/// gone. It gains little at 1 µm and nothing from 2 µm on, where the camera's lattice may serve.
+/// Defocus in µm of mountant up to which the in-focus correction has full weight, and from which it has none. Its
+/// effect is small at 1 µm and zero from 2 µm on, where the camera's lattice may be used.
 const CORRECTED_UM: [f64; 2] = [1.0, 2.0];
 
-/// The part of the correction that is lost under a full aperture. It says how light that is scattered twice interferes,
-/// and there much of it does not; fitted to Abbe's images of discs, specks and nuclei.
+/// Fraction of the correction lost at a full condenser aperture, where twice-scattered light interferes less. Fitted to
+/// Abbe images of discs, specks and nuclei.
 const SCATTERED_APART: f64 = 0.4;
 
-/// Where the spectrum of the correction begins to fade, as a part of the cutoff: a step would ring around sharp things.
+/// Start of the taper of the correction's spectrum, as a fraction of the cutoff. A sharp cut would ring at edges.
 const TAPER_FROM: f64 = 0.75;
 
-/// The transfer that may be left of detail finer than pixels, on the camera's lattice.
+/// Largest transfer at sub-pixel frequencies for which the camera's lattice is used.
 const SMOOTH_TRANSFER: f64 = 0.05;
 
-/// Least transfer that a restoring filter divides by: what an image has less of than that is more noise than detail.
+/// Smallest divisor of the restoring filter. Weaker frequencies of an image are mostly noise.
 const LEAST_TRANSFER: f32 = 0.1;
 
-/// Which lattice a factor of the light is sampled on.
+/// Sampling lattice of a transmission factor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Lattice {
-    /// That of the object, [`oversampling`](crate::MicroscopeParams::oversampling) samples along the side of a pixel.
+    /// The object's lattice, with [`oversampling`](crate::MicroscopeParams::oversampling) samples per pixel side.
     Object,
-    /// That of the camera, each value the mean over its pixel.
+    /// The camera's lattice; each value is the mean over a pixel.
     #[default]
     Camera,
 }
 
-/// What the spectra of something at one depth are multiplied with for one plane.
+/// Filter of one depth and stage position.
 #[derive(Debug, Clone)]
 pub(crate) struct Filter {
     pub(crate) lattice: Lattice,
-    /// Whether the correction of the in-focus form takes part.
+    /// Whether the in-focus correction is applied.
     pub(crate) is_corrected: bool,
     response: Response,
     restores: bool,
 }
 
-/// (H_A, H_P, G), or of a restoring filter (H_A, –, H_A in focus).
+/// (H_A, H_P, G), or (H_A, –, H_A in focus) for a restoring filter.
 #[derive(Debug, Clone)]
 enum Response {
     Round(Box<[Table; 3]>),
     Sided(Vec<[Complex32; 3]>),
 }
 
-/// Entries of a table, a power of two: places in it then need no check.
+/// Entries of a table. A power of two makes bounds checks unnecessary.
 const ENTRIES: usize = 512;
 
-/// Values at multiples of a frequency, each with the difference to the next, and zeros after the last.
+/// Values at multiples of a frequency, each with the difference to the next, padded with zeros.
 type Table = [[f32; 2]; ENTRIES];
 
 /// The three responses of a filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Part {
-    /// H_A, of the absorbed light.
+    /// H_A, the response to absorption.
     Absorption,
-    /// H_P, of the phase.
+    /// H_P, the response to phase delay.
     Phase,
-    /// −G, of the correction of the in-focus form, which is light and not its lack.
+    /// −G, the in-focus correction; the sign converts transmitted to absorbed light.
     Correction,
 }
 
-/// Frequencies of a block of a spectrum, in steps of the filter's table, and what the mean over a pixel leaves of them.
+/// Frequencies of a block of a spectrum, in steps of the filter's table, and the transfer of the pixel mean.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Block<'a> {
-    /// From one frequency along x to the next.
+    /// Frequency step along x.
     pub(crate) step_x: f32,
-    /// Of the lanes.
+    /// Frequencies along y of the lanes.
     pub(crate) y: &'a [f32; LANES],
-    /// From frequency 0 on.
+    /// Transfer of the pixel mean along x, from frequency 0.
     pub(crate) pixel_x: &'a [f32],
     pub(crate) pixel_y: &'a [f32; LANES],
 }
 
 impl Filter {
-    /// `transfer` is that depth's.
+    /// Creates the filter of a depth and stage position. `transfer` belongs to the same depth.
     pub(crate) fn new(microscope: &Microscope, depth_um: f64, stage_um: f64, transfer: &Transfer) -> Self {
         let params = microscope.params();
         let defocus = microscope.defocus_um(depth_um, stage_um).abs();
         let [whole, gone] = CORRECTED_UM;
         let coherent = 1.0 - SCATTERED_APART * incoherence(params.condenser_na / params.na);
-        let share = coherent * fade((defocus - whole) / (gone - whole));
+        let weight = coherent * fade((defocus - whole) / (gone - whole));
         let (radius, cutoff) = (microscope.cone_radius_um(depth_um, stage_um), microscope.cutoff());
         let nyquist = 0.5 / params.pixel_um;
         let is_smooth = params.oversampling > 1 && defocus >= gone && transfer.extent(SMOOTH_TRANSFER) <= nyquist;
         let lattice = if is_smooth { Lattice::Camera } else { Lattice::Object };
         let correction =
-            |f: f64| -share * pillbox(TAU * f * radius) * fade((f / cutoff - TAPER_FROM) / (1.0 - TAPER_FROM));
-        let correction = |f: f64| if share > 0.0 { correction(f) } else { 0.0 };
+            |f: f64| -weight * pillbox(TAU * f * radius) * fade((f / cutoff - TAPER_FROM) / (1.0 - TAPER_FROM));
+        let correction = |f: f64| if weight > 0.0 { correction(f) } else { 0.0 };
         let response = Response::new(transfer, correction);
-        Self { lattice, is_corrected: share > 0.0, response, restores: false }
+        Self { lattice, is_corrected: weight > 0.0, response, restores: false }
     }
 
-    /// The in-focus transfer function alone.
+    /// Returns the filter of the in-focus transfer function, without correction.
     pub(crate) fn in_focus(microscope: &Microscope) -> Self {
         let response = Response::new(&Transfer::new(microscope, 0.0, 0.0), |_| 0.0);
         Self { lattice: Lattice::Object, is_corrected: false, response, restores: false }
     }
 
-    /// Makes it the filter for what was seen in focus, through `in_focus` and the camera's pixels, already.
+    /// Turns the filter into one for objects that were already imaged in focus, through `in_focus` and the camera
+    /// pixels.
     pub(crate) fn restore(&mut self, in_focus: &Self) {
         match (&mut self.response, &in_focus.response) {
             (Response::Round(tables), Response::Round(focused)) => tables[2] = focused[0],
@@ -114,13 +115,13 @@ impl Filter {
                     entry[2] = focused[0];
                 }
             }
-            _ => unreachable!("filters of one microscope have one shape"),
+            _ => unreachable!("filters of one microscope have the same shape"),
         }
         (self.is_corrected, self.restores) = (false, true);
     }
 
-    /// Adds a block of a spectrum, times a response, to `sum`: kx up to `reach`, of both signs, the negative ones at
-    /// the end of either.
+    /// Adds a block of a spectrum times a response to `sum`, for kx from −`reach` to `reach`. Negative kx are at the
+    /// end of both slices.
     pub(crate) fn add(&self, part: Part, at: Block<'_>, spectrum: &[Lanes], reach: usize, sum: &mut [Lanes]) {
         match &self.response {
             Response::Round(tables) if self.restores => {
@@ -134,9 +135,10 @@ impl Filter {
                         let entry = sided(table, x, at.y[l]);
                         let mut weight = entry[part as usize];
                         if self.restores {
-                            let seen = entry[2] * (pixel_x * at.pixel_y[l]);
-                            let size = seen.norm_sqr().sqrt();
-                            weight = weight * seen.conj() / (size * size.max(LEAST_TRANSFER)).max(f32::MIN_POSITIVE);
+                            let in_focus = entry[2] * (pixel_x * at.pixel_y[l]);
+                            let size = in_focus.norm_sqr().sqrt();
+                            weight =
+                                weight * in_focus.conj() / (size * size.max(LEAST_TRANSFER)).max(f32::MIN_POSITIVE);
                         }
                         let value = Complex32::new(spectrum[from][0][l], spectrum[from][1][l]) * weight;
                         sum[to][0][l] += value.re;
@@ -163,15 +165,15 @@ fn add_round(table: &Table, at: Block<'_>, spectrum: &[Lanes], reach: usize, sum
     }
 }
 
-/// Divided by what the lens and the pixels left in focus.
+/// Divides by the in-focus transfer of lens and pixels.
 #[multiversion(targets = "simd")]
 fn add_restored(table: &Table, focused: &Table, at: Block<'_>, spectrum: &[Lanes], reach: usize, sum: &mut [Lanes]) {
     let y2 = at.y.map(|y| y * y);
     for k in 0..=reach {
         let mut weights = entries(table, k, at.step_x, &y2);
-        let seen = entries(focused, k, at.step_x, &y2);
-        for ((weight, seen), pixel_y) in weights.iter_mut().zip(&seen).zip(at.pixel_y) {
-            *weight /= (seen * at.pixel_x[k] * pixel_y).max(LEAST_TRANSFER);
+        let in_focus = entries(focused, k, at.step_x, &y2);
+        for ((weight, in_focus), pixel_y) in weights.iter_mut().zip(&in_focus).zip(at.pixel_y) {
+            *weight /= (in_focus * at.pixel_x[k] * pixel_y).max(LEAST_TRANSFER);
         }
         accumulate(&weights, k, spectrum, sum);
     }
@@ -195,13 +197,13 @@ fn weigh(weights: &[f32; LANES], from: &Lanes, to: &mut Lanes) {
     }
 }
 
-/// Values of a table in a block, linear between its entries.
+/// Returns table values for a block, by linear interpolation.
 #[inline(always)]
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "places in the table")]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "indices of the table")]
 fn entries(table: &Table, k: usize, step_x: f32, y2: &[f32; LANES]) -> [f32; LANES] {
     let x = k as u32 as f32 * step_x;
     let x2 = x * x;
-    // Both are small whole numbers: signed ones are converted faster.
+    // Signed integers convert faster.
     let mut places = [0_i32; LANES];
     let mut parts = [0.0; LANES];
     for ((place, part), y2) in places.iter_mut().zip(&mut parts).zip(y2) {
@@ -217,8 +219,8 @@ fn entries(table: &Table, k: usize, step_x: f32, y2: &[f32; LANES]) -> [f32; LAN
     values
 }
 
-/// The responses at a frequency.
-#[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 spectra")]
+/// Returns the three responses at a frequency.
+#[expect(clippy::cast_possible_truncation, reason = "spectra use single precision")]
 fn sided(table: &[[Complex32; 3]], x: f32, y: f32) -> [Complex32; 3] {
     let mut mixed = [Complex32::ZERO; 3];
     for (place, weight) in corners([x, y].map(f64::from)).into_iter().flatten() {
@@ -230,7 +232,7 @@ fn sided(table: &[[Complex32; 3]], x: f32, y: f32) -> [Complex32; 3] {
 }
 
 impl Response {
-    #[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 spectra")]
+    #[expect(clippy::cast_possible_truncation, reason = "spectra use single precision")]
     fn new(transfer: &Transfer, correction: impl Fn(f64) -> f64) -> Self {
         let list = transfer.table.iter().enumerate();
         if transfer.is_round() {
@@ -248,25 +250,24 @@ impl Response {
         }
         let complex = |[re, im]: [f64; 2]| Complex32::new(re as f32, im as f32);
         let entry = |(i, &[absorption, phase]): (usize, &[[f64; 2]; 2])| {
-            let correction = correction(transfer.step * (i % SIDED_SAMPLES) as f64);
+            let correction = correction(transfer.step * (i % ASYMMETRIC_SAMPLES) as f64);
             [complex(absorption), complex(phase), complex([correction, 0.0])]
         };
         Self::Sided(list.map(entry).collect())
     }
 }
 
-/// From 0 for a narrow condenser to 1 for one opened to the whole of the objective's aperture: 0.04 at 0.6 of it, 0.2
-/// at 0.8.
+/// Rises from 0 for a narrow condenser to 1 for one opened to the objective's aperture: 0.04 at a ratio of 0.6, 0.2 at
+/// 0.8.
 pub(crate) fn incoherence(ratio: f64) -> f64 {
     let r = ratio.min(1.0);
     let cube = r * r * r;
     cube * cube * r
 }
 
-/// The spectrum of a disc, 2 J₁(q)/q.
+/// Returns the spectrum of a disc, 2 J₁(q)/q.
 pub(crate) fn pillbox(q: f64) -> f64 {
-    /// Up to here the power series ∑ (−q²/4)ᵏ / k! (k + 1)! loses fewer than half of the digits, and its terms are
-    /// enough.
+    /// Range of the power series ∑ (−q²/4)ᵏ / k! (k + 1)!: it loses less than half of the digits, and 20 terms suffice.
     const SERIES_TO: f64 = 8.0;
     const SERIES: [f64; 20] = {
         let mut terms = [1.0; 20];
@@ -289,7 +290,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_disc_is_bessels_function() {
+    fn pillbox_matches_the_bessel_function() {
         assert_eq!(pillbox(0.0), 1.0);
         for i in 1..2000 {
             let q = 0.01 * f64::from(i);

@@ -1,23 +1,23 @@
-//! The direct path: a separable sum over taps, in strips of columns that stay in the cache.
+//! Direct convolution: a separable sum over taps, in strips of columns that fit in the cache.
 
 use crate::{Border, Scratch};
 
-/// The least columns of a strip. One such strip of a camera frame (1038 rows) fits in the second-level cache.
+/// Smallest number of columns of a strip. A strip of a camera frame (1038 rows) fits in the second-level cache.
 const STRIP: usize = 256;
 
 /// Pixels of a strip that fit in the second-level cache.
 const SECOND_LEVEL: usize = 1 << 18;
 
-/// Pixels that fit in the first-level cache: those that one output row needs should.
+/// Pixels that fit in the first-level cache; the inputs of one output row should fit.
 const FIRST_LEVEL: usize = 1 << 13;
 
-/// Pixels whose sums are held in registers while the taps go by.
+/// Pixels whose sums stay in registers during the loop over taps.
 const BLOCK: usize = 64;
 
-/// A remainder is finished in blocks of this many.
+/// Block size of the remainder.
 const LANES: usize = 16;
 
-/// An image and what surrounds it.
+/// An image with its border mode.
 #[derive(Clone, Copy)]
 pub(crate) struct Source<'a> {
     pub(crate) pixels: &'a [f32],
@@ -35,8 +35,8 @@ impl Source<'_> {
     }
 }
 
-/// Blurs `source`, larger by `margin` on each side, with the taps `half[0]` at the centre and `half[k]` at ±k: as many rows
-/// of that as `dst` holds, from the one at row `first` of `source` on, which lies before it where negative.
+/// Blurs `source`, enlarged by `margin` on each side. `half[0]` is the central tap, `half[k]` the taps at ±k. `dst`
+/// receives as many rows as it holds, from row `first` of `source`, which may be negative.
 pub(crate) fn blur(
     source: Source<'_>,
     half: &[f32],
@@ -54,9 +54,9 @@ pub(crate) fn blur(
     }
 }
 
-/// Columns `x .. x + columns` of `dst`.
+/// Computes the columns `x .. x + columns` of `dst`.
 #[multiversion::multiversion(targets = "simd")]
-#[expect(clippy::too_many_arguments, reason = "one loop nest, cut where it is dispatched")]
+#[expect(clippy::too_many_arguments, reason = "one loop nest, split for multiversioning")]
 fn blur_strip(
     source: Source<'_>,
     half: &[f32],
@@ -72,10 +72,10 @@ fn blur_strip(
     let radius = half.len() - 1;
     let pitch = columns.next_multiple_of(LANES);
     let dst_width = width + 2 * margin;
-    let strip = at_least(strip, (dst.len() / dst_width + 2 * radius) * pitch);
-    let line = at_least(line, pitch + 2 * radius);
+    let strip = resized(strip, (dst.len() / dst_width + 2 * radius) * pitch);
+    let line = resized(line, pitch + 2 * radius);
 
-    // Along the rows: those that the rows of `dst` need.
+    // Convolves along the rows that `dst` needs.
     let start = x.cast_signed() - (margin + radius).cast_signed();
     let taps = useful(border, radius, start + radius.cast_signed(), columns, width);
     let interior = usize::try_from(start).ok().filter(|&s| s + line.len() <= width);
@@ -91,7 +91,7 @@ fn blur_strip(
         }
     }
 
-    // Along the columns.
+    // Convolves along the columns.
     for (i, row) in dst.chunks_exact_mut(dst_width).enumerate() {
         let y = first + i.cast_signed();
         let taps = useful(border, radius, y, 1, height);
@@ -99,16 +99,16 @@ fn blur_strip(
     }
 }
 
-/// The first `len` values of memory that grows where it must. What they hold is left over from before.
-fn at_least(memory: &mut Vec<f32>, len: usize) -> &mut [f32] {
+/// Returns the first `len` values of a growing buffer. Old values are not cleared.
+fn resized(memory: &mut Vec<f32>, len: usize) -> &mut [f32] {
     if memory.len() < len {
         memory.resize(len, 0.0);
     }
     &mut memory[..len]
 }
 
-/// First and last tap that can meet a pixel of `0..len` from the `count` places from `from` on,
-/// if beyond there is nothing.
+/// Returns the first and last tap that reach a pixel of `0..len` from `count` positions starting at `from`. With other
+/// borders than zero, all taps count.
 #[inline(always)]
 fn useful(border: Border, radius: usize, from: isize, count: usize, len: usize) -> (usize, usize) {
     if border != Border::Zero {
@@ -123,8 +123,8 @@ fn useful(border: Border, radius: usize, from: isize, count: usize, len: usize) 
 
 /// `out[i] = ∑ₖ half[k] · (data[centre + i - k·stride] + data[centre + i + k·stride])`.
 ///
-/// Each pair is added before it is weighed: a mirrored image gives the mirrored result, bit for
-/// bit. The smallest taps come first, which keeps the rounding small.
+/// Adds the two pixels of a pair before weighting: a mirrored image gives the mirrored result, bit for bit. The
+/// smallest taps come first, which reduces rounding errors.
 #[inline(always)]
 fn fir(data: &[f32], centre: usize, stride: usize, half: &[f32], taps: (usize, usize), out: &mut [f32]) {
     let mut at = 0;
@@ -138,7 +138,7 @@ fn fir(data: &[f32], centre: usize, stride: usize, half: &[f32], taps: (usize, u
         return;
     }
     if let Some(at) = out.len().checked_sub(BLOCK) {
-        // The last block once more, from further left: the same sums, and no remainder.
+        // Recomputes the end of the row with a full block, instead of a remainder.
         out[at..].copy_from_slice(&sums::<BLOCK>(data, centre + at, stride, half, taps));
         return;
     }

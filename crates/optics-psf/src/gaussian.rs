@@ -5,27 +5,25 @@ use crate::kernel::{Kernel, LOST_TAIL};
 use crate::pyramid::{self, Pyramid};
 use crate::scratch::Scratch;
 
-/// How a blur is computed. The kernel that is meant is the same.
+/// Method of computation. All methods approximate the same kernel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
-    /// Every tap, in single precision: the definition, and the oracle of the others. The time
-    /// grows with the width.
+    /// Direct sum over all taps in single precision: the reference for the other methods. The time grows with σ.
     Direct,
-    /// Halved as often as the width allows, at all from 2.8 pixels on, blurred and doubled again.
-    /// The error is below 1e-3 of the range of the image; the time hardly depends on the width.
+    /// Downsampled as often as σ allows, from 2.8 pixels on, blurred and upsampled. The error is below 1e-3 of the
+    /// image's range; the time hardly depends on σ.
     Decimated,
-    /// Decimated where that costs less than 2e-4 of the range, which is from 3.5 pixels on; direct
-    /// below.
+    /// Decimated from 3.5 pixels on, with an error below 2e-4 of the range; direct below.
     #[default]
     Auto,
 }
 
-/// G_σ of Eqs. 13, 14 and 16: the normal point spread function, on the lattice of the pixels.
+/// The Gaussian blur G_σ of Eqs. 13, 14 and 16, on the pixel lattice.
 ///
-/// The paper leaves its sampling open. This is the discrete normal distribution wₙ ∝ exp(-n²/2s²) with s solved for
-/// ∑ n² wₙ = σ² (1e-12), at every σ ≥ 0. It is positive, sums to one, and moves continuously through a focus stack: from
-/// the identity at σ = 0 to s = σ (within 1e-8) above a little more than a pixel. Taps are kept out to where less than
-/// 1e-7 of the sum is lost, or as [`truncated`](Self::truncated) says; the variance is exact for those that are kept.
+/// The paper leaves the sampling open. This kernel is the discrete normal distribution wₙ ∝ exp(-n²/2s²) with s solved
+/// for ∑ n² wₙ = σ² (1e-12), at every σ ≥ 0. It is positive, sums to one, and is continuous in σ: from the identity at
+/// σ = 0 to s = σ (within 1e-8) above about one pixel. The taps omit less than 1e-7 of the sum, or the fraction given
+/// to [`truncated`](Self::truncated); the variance of the truncated kernel is exact.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gaussian {
     sigma_px: f64,
@@ -34,28 +32,28 @@ pub struct Gaussian {
 }
 
 impl Gaussian {
-    /// A blur of standard deviation `sigma_px`, 0 to 4096 pixels, computed as [`Method::Auto`]
-    /// says.
+    /// Creates a blur of standard deviation `sigma_px`, 0 to 4096 pixels, with [`Method::Auto`].
     ///
     /// # Errors
     ///
-    /// If `sigma_px` is outside that range or not a number.
+    /// If `sigma_px` is out of range or not a number.
     pub fn new(sigma_px: f64) -> Result<Self, Error> {
         Self::truncated(sigma_px, Method::Auto, LOST_TAIL)
     }
 
-    /// A blur whose taps reach out to where less than `lost_tail` of the sum is lost, 1e-7, as of [`new`](Self::new), to
-    /// 1e-2: a quarter fewer taps at 1e-4. The sum is still one and the variance still exact. No pixel
-    /// errs by more than ten times `lost_tail` of the range of the image; corners, discs and noise
-    /// err by less than half of that.
+    /// Creates a blur whose taps omit less than `lost_tail` of the sum, from 1e-7, the value of [`new`](Self::new), to
+    /// 1e-2. 1e-4 saves a quarter of the taps.
+    ///
+    /// The sum is one and the variance exact for every value. The error of a pixel is at most ten times `lost_tail` of
+    /// the image's range; for corners, discs and noise it is less than half of that.
     ///
     /// # Errors
     ///
-    /// If `sigma_px` is not a number from 0 to 4096 or `lost_tail` outside its range.
+    /// If `sigma_px` is not a number from 0 to 4096, or `lost_tail` is out of range.
     pub fn truncated(sigma_px: f64, method: Method, lost_tail: f64) -> Result<Self, Error> {
-        // Wider than any field of view; it bounds the memory of the taps.
+        // Wider than any field of view; limits the memory of the taps.
         within("sigma_px", sigma_px, 0.0..=4096.0, "a number from 0 to 4096")?;
-        // With more of its tail lost a kernel is a Gaussian no longer.
+        // Shorter kernels are no longer Gaussian.
         within("lost_tail", lost_tail, LOST_TAIL..=1e-2, "a number from 1e-7 to 1e-2")?;
         let kernel = Kernel::new(sigma_px, lost_tail);
         let narrowest = match method {
@@ -67,30 +65,30 @@ impl Gaussian {
         Ok(Self { sigma_px, kernel, pyramid })
     }
 
-    /// The standard deviation in pixels.
+    /// Returns the standard deviation in pixels.
     #[must_use]
     pub fn sigma_px(&self) -> f64 {
         self.sigma_px
     }
 
-    /// The distance in pixels to the last tap: beyond it lies less than 1e-7 of the sum, or
-    /// what [`truncated`](Self::truncated) was given.
+    /// Returns the distance to the last tap in pixels. Less than 1e-7 of the sum, or the value given to
+    /// [`truncated`](Self::truncated), lies beyond it.
     #[must_use]
     pub fn radius(&self) -> usize {
         self.kernel.radius()
     }
 
-    /// Half of the kernel along one axis: the weight at 0, at ±1 … at ±[`radius`](Self::radius).
+    /// Returns half of the kernel along one axis: the weights at 0, ±1 … ±[`radius`](Self::radius).
     #[must_use]
     pub fn taps(&self) -> &[f64] {
         &self.kernel.taps
     }
 
-    /// Blurs `image`, any values in rows of `width` pixels.
+    /// Blurs `image`, in rows of `width` pixels.
     ///
     /// # Panics
     ///
-    /// If `image` is empty or not whole rows of `width`.
+    /// If `image` is empty, or its length is not a multiple of `width`.
     #[must_use]
     pub fn blur(&self, image: &[f32], width: usize, border: Border) -> Vec<f32> {
         let mut blurred = vec![0.0; image.len()];
@@ -98,23 +96,21 @@ impl Gaussian {
         blurred
     }
 
-    /// Blurs `src`, any values in rows of `width` pixels, into `dst` of the same size.
+    /// Blurs `src`, in rows of `width` pixels, into `dst` of the same size.
     ///
     /// # Panics
     ///
-    /// If `src` is empty or not whole rows of `width`, or `dst` is not as long as it.
+    /// If `src` is empty, or its length is not a multiple of `width` or differs from that of `dst`.
     pub fn blur_into(&self, src: &[f32], width: usize, border: Border, dst: &mut [f32], scratch: &mut Scratch) {
         self.apply(src, width, border, 0, dst, scratch);
     }
 
-    /// Blurs some rows of `src`, any values in rows of `width` pixels: those from row `first` on, as
-    /// many as `dst` holds, as they are in the whole. Every tap is summed, as with
-    /// [`Method::Direct`].
+    /// Blurs rows of `src` into `dst`, from row `first`, as many as `dst` holds. The result equals these rows of the
+    /// complete blur with [`Method::Direct`].
     ///
     /// # Panics
     ///
-    /// If `src` is empty or not whole rows of `width`, or `dst` not whole rows of it or beyond the
-    /// last.
+    /// If `src` is empty, a length is not a multiple of `width`, or the rows exceed the image.
     pub fn blur_rows_into(
         &self,
         src: &[f32],
@@ -124,35 +120,34 @@ impl Gaussian {
         dst: &mut [f32],
         scratch: &mut Scratch,
     ) {
-        whole_rows(src, width);
+        assert_rows(src, width);
         let rows = src.len() / width;
         let within = dst.len().is_multiple_of(width) && first + dst.len() / width <= rows;
-        assert!(within, "{} pixels from row {first} on are no rows of the {rows} there are", dst.len());
+        assert!(within, "{} pixels from row {first} exceed the {rows} rows of the image", dst.len());
         let source = Source { pixels: src, width, border };
         fir::blur(source, &self.kernel.half, 0, first.cast_signed(), dst, scratch);
     }
 
-    /// Blurs an object that is alone in its `tile` and returns the larger tile it then fills, and
-    /// by how many pixels that is larger on each side (the [`radius`](Self::radius)).
+    /// Blurs an isolated object in its `tile`. Returns the enlarged tile, and its margin on each side in pixels, the
+    /// [`radius`](Self::radius).
     ///
     /// # Panics
     ///
-    /// If `tile` is empty or not whole rows of `width`.
+    /// If `tile` is empty, or its length is not a multiple of `width`.
     #[must_use]
-    pub fn spread(&self, tile: &[f32], width: usize) -> (Vec<f32>, usize) {
+    pub fn blur_expanded(&self, tile: &[f32], width: usize) -> (Vec<f32>, usize) {
         let around = 2 * self.radius();
         let mut wide = vec![0.0; (width + around) * (tile.len() / width.max(1) + around)];
-        self.spread_into(tile, width, &mut wide, &mut Scratch::new());
+        self.blur_expanded_into(tile, width, &mut wide, &mut Scratch::new());
         (wide, self.radius())
     }
 
-    /// Blurs an object that is alone in its `tile` into `dst`, whose rows are
-    /// `width + 2 · radius` pixels and which has `2 · radius` rows more.
+    /// Blurs an isolated object in its `tile` into `dst`, which has `2 · radius` more columns and rows.
     ///
     /// # Panics
     ///
-    /// If `tile` is empty or not whole rows of `width`, or `dst` has another length.
-    pub fn spread_into(&self, tile: &[f32], width: usize, dst: &mut [f32], scratch: &mut Scratch) {
+    /// If `tile` is empty, its length is not a multiple of `width`, or `dst` has another length.
+    pub fn blur_expanded_into(&self, tile: &[f32], width: usize, dst: &mut [f32], scratch: &mut Scratch) {
         self.apply(tile, width, Border::Zero, self.radius(), dst, scratch);
     }
 
@@ -165,9 +160,9 @@ impl Gaussian {
         dst: &mut [f32],
         scratch: &mut Scratch,
     ) {
-        whole_rows(pixels, width);
+        assert_rows(pixels, width);
         let expected = (width + 2 * margin) * (pixels.len() / width + 2 * margin);
-        assert_eq!(dst.len(), expected, "dst has the wrong number of pixels");
+        assert_eq!(dst.len(), expected, "`dst` has the wrong number of pixels");
         let source = Source { pixels, width, border };
         match &self.pyramid {
             Some(pyramid) => pyramid.blur(source, margin, dst, scratch),
@@ -176,20 +171,20 @@ impl Gaussian {
     }
 }
 
-fn whole_rows(pixels: &[f32], width: usize) {
+fn assert_rows(pixels: &[f32], width: usize) {
     let whole = width > 0 && !pixels.is_empty() && pixels.len().is_multiple_of(width);
-    assert!(whole, "{} pixels are not whole rows of {width}", pixels.len());
+    assert!(whole, "{} pixels are not a multiple of the width, {width}", pixels.len());
 }
 
-/// How far a bright-field microscope spreads light, in the plane and with depth.
+/// Gaussian blur of a bright-field microscope, in the image plane and with defocus.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FocusParams {
-    /// σ_x,y of Eq. 13, in pixels, >= 0: the blur of an edge that is in focus. Default 0.9, the
-    /// paper's (0.22 µm at 0.25 µm a pixel). The diffraction of a 0.95 NA lens and the area of
-    /// the pixel account for 0.64; the rest is the relay optics, the sensor and vibration.
+    /// σ_x,y of Eq. 13, in pixels, >= 0: the blur of an edge in focus. Default 0.9, the paper's (0.22 µm at 0.25 µm per
+    /// pixel). Diffraction of a 0.95 NA lens and the pixel area account for 0.64; the rest is relay optics, sensor and
+    /// vibration.
     pub sigma_xy_px: f64,
-    /// σ_z of Eq. 14 for each µm between an object and the focal plane, in pixels per µm, >= 0.
-    /// Default 1, the paper's in the reading of its program: see [`FocusParams::paper`].
+    /// σ_z of Eq. 14 per µm of distance between object and focal plane, in pixels per µm, >= 0. Default 1, the paper's
+    /// value as its program reads it: see [`FocusParams::paper`].
     pub sigma_per_um: f64,
 }
 
@@ -200,17 +195,16 @@ impl Default for FocusParams {
 }
 
 impl FocusParams {
-    /// The paper's: "σ ≃ dz, where dz is the z-offset in µm" with σ in pixels of 0.25 µm, which is
-    /// what the authors' program computes: a quarter of a µm of blur for each µm of depth. Partially
-    /// coherent imaging gives the same for a condenser aperture of 0.6 and an object in the
-    /// mountant.
+    /// Returns the paper's values: "σ ≃ dz, where dz is the z-offset in µm" with σ in pixels of 0.25 µm, as the
+    /// authors' program computes it. That is a quarter of a µm of blur per µm of depth. Partially coherent imaging
+    /// gives the same for a condenser aperture of 0.6 and an object in the mountant.
     #[must_use]
     pub fn paper() -> Self {
         Self::default()
     }
 
-    /// The paper's words read with σ in µm: four pixels of 0.25 µm for each µm. No setting of the
-    /// condenser reaches that; it is here to compare with.
+    /// Returns the paper's values with σ read in µm: four pixels of 0.25 µm per µm. No condenser aperture reaches this;
+    /// for comparison.
     #[must_use]
     pub fn paper_in_micrometres() -> Self {
         Self { sigma_per_um: 4.0, ..Self::paper() }
@@ -222,26 +216,26 @@ impl FocusParams {
 pub struct DepthOfFocus(FocusParams);
 
 impl DepthOfFocus {
-    /// Checks the parameters.
+    /// Creates the model from validated parameters.
     ///
     /// # Errors
     ///
-    /// If a field is negative or not a finite number.
+    /// If a field is negative or not finite.
     pub fn new(params: &FocusParams) -> Result<Self, Error> {
         for (field, value) in [("sigma_xy_px", params.sigma_xy_px), ("sigma_per_um", params.sigma_per_um)] {
-            require(field, value, value >= 0.0, "0 or more")?;
+            require(field, value, value >= 0.0, "at least 0")?;
         }
         Ok(Self(params.clone()))
     }
 
-    /// σ_z in pixels of an object `depth_um` from the focal plane, on either side (Eq. 14).
+    /// Returns σ_z in pixels of an object at distance `depth_um` from the focal plane, on either side (Eq. 14).
     #[must_use]
     pub fn sigma_px(&self, depth_um: f64) -> f64 {
         // "Impulse response": σ = k·|dz|
         self.0.sigma_per_um * depth_um.abs()
     }
 
-    /// σ_x,y in pixels, the same for every depth (Eq. 13).
+    /// Returns σ_x,y in pixels, the same at every depth (Eq. 13).
     #[must_use]
     pub fn sigma_xy_px(&self) -> f64 {
         self.0.sigma_xy_px
@@ -253,7 +247,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn blur_is_linear_in_depth_and_even() {
+    fn blur_is_linear_in_depth_and_symmetric() {
         for (params, per_um) in [(FocusParams::paper(), 1.0), (FocusParams::paper_in_micrometres(), 4.0)] {
             let focus = DepthOfFocus::new(&params).unwrap();
             assert_eq!([0.0, 1.5, -1.5].map(|z| focus.sigma_px(z)), [0.0, 1.5 * per_um, 1.5 * per_um]);
@@ -262,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn impossible_numbers_are_refused_by_name() {
+    fn out_of_range_values_are_rejected_by_field() {
         for bad in [-0.1, f64::NAN, f64::INFINITY] {
             let xy = FocusParams { sigma_xy_px: bad, ..FocusParams::default() };
             let z = FocusParams { sigma_per_um: bad, ..FocusParams::default() };

@@ -1,28 +1,27 @@
 use crate::error::{Error, require, within};
-use crate::lens::Rules;
 use crate::microscope::distance;
+use crate::overlap::QuadratureRules;
 use crate::pupil::turn;
 
-/// A lens as it was designed, and what it looks through.
+/// Parameters of [`GibsonLanni`]: design and actual values of the optical path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GibsonLanniParams {
-    /// Numerical aperture, above 0, at most the immersion index, below the mount's and the glass's.
+    /// Numerical aperture, above 0, at most the immersion and cover glass indices, below the index of the mountant.
     /// Default 0.95, the paper's.
     pub na: f64,
-    /// Wavelength in the vacuum, 0.1 to 10 µm. Default 0.57, the paper's filter.
+    /// Vacuum wavelength, 0.1 to 10 µm. Default 0.57, the paper's filter.
     pub wavelength_um: f64,
     /// Depth of the point below the cover glass, 0 to 1000 µm. Default 0, ours.
     pub depth_um: f64,
     /// Refractive index of the mountant, 1 to 3. Default 1.515, ours.
     pub mount_index: f64,
-    /// Index of the immersion medium, and the one it was designed for, 1 to 3. Default 1, ours: air.
+    /// Refractive index of the immersion medium, actual and design value, 1 to 3. Default 1, ours: air.
     pub immersion_index: [f64; 2],
-    /// Working distance for which the lens was designed, 0 to 10 000 µm. Default 150, ours.
+    /// Design working distance, 0 to 10 000 µm. Default 150, ours.
     pub working_distance_um: f64,
-    /// Thickness of the cover glass, and the one it was designed for, 0 to 10 000 µm. Default 170, the
-    /// standard.
+    /// Thickness of the cover glass, actual and design value, 0 to 10 000 µm. Default 170, the standard.
     pub cover_um: [f64; 2],
-    /// Index of the cover glass, and the one it was designed for, 1 to 3. Default 1.515, ours.
+    /// Refractive index of the cover glass, actual and design value, 1 to 3. Default 1.515, ours.
     pub cover_index: [f64; 2],
 }
 
@@ -41,27 +40,26 @@ impl Default for GibsonLanniParams {
     }
 }
 
-/// The scalar point spread function of a lens used off its design (Gibson and Lanni, DOI
-/// 10.1364/JOSAA.8.001601): a point that shines by itself, below a cover glass.
+/// The scalar point spread function of a lens used away from its design conditions (Gibson and Lanni, DOI
+/// 10.1364/JOSAA.8.001601): a self-luminous point below a cover glass.
 ///
-/// I(r, z) = |2 ∫₀¹ J₀(k NA r ρ) exp(ik OPD) ρ dρ|², 1 in the focus of a perfect lens, with
-/// OPD = z_p g(n_s) + t g(n_i) − t_i⁰ g(n_i⁰) + t_g g(n_g) − t_g⁰ g(n_g⁰), g(n) = √(n² − NA² ρ²), and the
-/// immersion t = z_p − z + n_i (−z_p/n_s − t_g/n_g + t_g⁰/n_g⁰ + t_i⁰/n_i⁰) as thick as focusing by
-/// z leaves it.
+/// I(r, z) = |2 ∫₀¹ J₀(k NA r ρ) exp(ik OPD) ρ dρ|², 1 in the focus of a perfect lens, with OPD = z_p g(n_s) + t g(n_i)
+/// − t_i⁰ g(n_i⁰) + t_g g(n_g) − t_g⁰ g(n_g⁰), g(n) = √(n² − NA² ρ²). The thickness of the immersion layer at focus z
+/// is t = z_p − z + n_i (−z_p/n_s − t_g/n_g + t_g⁰/n_g⁰ + t_i⁰/n_i⁰).
 #[derive(Debug, Clone, PartialEq)]
 pub struct GibsonLanni {
     params: GibsonLanniParams,
 }
 
-/// Nodes of the quadrature: so many, and so many more for each fringe on the pupil.
+/// Quadrature nodes: a minimum, and the number per fringe on the pupil.
 const NODES: (usize, f64) = (24, 4.0);
 
 impl GibsonLanni {
-    /// Checks the parameters.
+    /// Creates the model from validated parameters.
     ///
     /// # Errors
     ///
-    /// If a number is not finite or outside the range its field states.
+    /// If a number is not finite or out of the range of its field.
     pub fn new(params: &GibsonLanniParams) -> Result<Self, Error> {
         let p = params;
         for (field, value) in [
@@ -75,7 +73,7 @@ impl GibsonLanni {
         }
         let smallest = p.immersion_index.into_iter().chain(p.cover_index).fold(f64::INFINITY, f64::min);
         let holds = p.na > 0.0 && p.na <= smallest && p.na < p.mount_index;
-        require("na", p.na, holds, "above 0, at most every index and below mount_index")?;
+        require("na", p.na, holds, "above 0, at most immersion_index and cover_index, and below mount_index")?;
         within("wavelength_um", p.wavelength_um, 0.1..=10.0, "a number from 0.1 to 10")?;
         within("depth_um", p.depth_um, 0.0..=1000.0, "a number from 0 to 1000")?;
         let [cover, designed] = p.cover_um;
@@ -87,8 +85,8 @@ impl GibsonLanni {
         Ok(Self { params: params.clone() })
     }
 
-    /// The intensity at distances `r_um` from the axis, one row for each focus `z_um`: 1 would be that of a
-    /// perfect lens in focus. Larger z focuses deeper.
+    /// Returns the intensity at the distances `r_um` from the axis, one row per focus position `z_um`. 1 is the
+    /// intensity of a perfect lens in focus. Larger z focuses deeper.
     ///
     /// # Errors
     ///
@@ -104,11 +102,11 @@ impl GibsonLanni {
         };
         let rings = r_um.iter().fold(0.0_f64, |most, r| most.max(r.abs())) * p.na / p.wavelength_um;
         let most = z_um.iter().map(fringes).fold(0.0, f64::max) + rings;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a float to whole saturates")]
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "float to integer casts saturate")]
         let nodes = NODES.0 + (most * NODES.1) as usize;
-        let mut rules = Rules::default();
+        let mut rules = QuadratureRules::default();
         let rule = rules.get(nodes);
-        // Of each node and z, the wave on the pupil; of each node and r, the Bessel function.
+        // Wavefront phases per node and z, and Bessel functions per node and r.
         let wave = |&z: &f64| rule.iter().map(|&[rho, _]| turn(self.waves(rho, z) - self.waves(0.0, z))).collect();
         let waves: Vec<Vec<(f64, f64)>> = z_um.iter().map(wave).collect();
         let k_na = core::f64::consts::TAU * p.na / p.wavelength_um;
@@ -124,7 +122,7 @@ impl GibsonLanni {
         Ok(intensity)
     }
 
-    /// OPD/λ at a distance from the centre of the pupil, whose rim lies at 1.
+    /// Returns OPD/λ at a normalised pupil radius; the rim is at 1.
     fn waves(&self, rho: f64, z: f64) -> f64 {
         let p = &self.params;
         let g = |n: f64| (n * n - p.na * p.na * rho * rho).max(0.0).sqrt();

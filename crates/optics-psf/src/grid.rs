@@ -1,9 +1,9 @@
-//! Sides and frequencies of grids that are transformed.
+//! Sizes and frequencies of FFT grids.
 
-/// Samples along a side of a grid.
+/// Range of grid sizes in samples.
 pub(crate) const SIDES: core::ops::RangeInclusive<f64> = 1.0..=32_768.0;
 
-/// The next length whose FFT is fast, 2ᵃ 3ᵇ 5ᶜ with an even number of samples.
+/// Returns the smallest even length 2ᵃ 3ᵇ 5ᶜ, for which an FFT is fast, of at least `least`.
 #[must_use]
 pub fn fast_length(least: usize) -> usize {
     let mut best = least.next_power_of_two().max(2);
@@ -19,7 +19,7 @@ pub fn fast_length(least: usize) -> usize {
     best
 }
 
-/// Signed frequency of a place in an FFT of `len`, in cycles per `len`.
+/// Returns the signed frequency of an FFT index, in cycles per `len`.
 pub(crate) fn signed(place: usize, len: usize) -> f64 {
     if 2 * place < len { place as f64 } else { place as f64 - len as f64 }
 }
@@ -29,8 +29,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fast_lengths_are_the_next_ones() {
-        // What has no other prime factors divides a high power of these.
+    fn fast_length_is_the_smallest_possible() {
+        // Numbers without other prime factors divide a high power of 30.
         let fast = |n: usize| n.is_multiple_of(2) && 30_u64.pow(11).is_multiple_of(n as u64);
         for least in 1..1500 {
             assert_eq!(fast_length(least), (least.max(2)..).find(|&n| fast(n)).unwrap(), "{least}");

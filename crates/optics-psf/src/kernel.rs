@@ -1,53 +1,52 @@
-/// Mass of the infinite kernel that lies beyond the last tap is below this: half a unit in the
-/// last place of a single-precision 1.
+/// Largest sum of the taps omitted: half a unit in the last place of a single-precision 1.
 pub(crate) const LOST_TAIL: f64 = 1e-7;
 
-/// Up to this radius the taps follow from one another; beyond, the roundings would add up.
+/// Largest radius for which taps follow from their neighbours; rounding errors accumulate beyond.
 const FEW_TAPS: usize = 64;
 
-/// A step of Newton's method, as a share, after which the next one would be below the rounding: its square.
+/// Relative Newton step after which the next step, its square, is below rounding.
 const SETTLED: f64 = 1e-9;
 
-/// From this width on the kernel is the sampled normal density.
+/// σ from which the kernel equals the sampled normal density.
 const DENSITY_FROM: f64 = 1.0;
 
-/// The discrete normal distribution of exact variance: wₙ ∝ exp(-t n²), of all distributions on
-/// the lattice with that variance the one of greatest entropy.
+/// The discrete normal distribution of exact variance: wₙ ∝ exp(-t n²). It has the greatest entropy of all
+/// distributions on the lattice with this variance.
 ///
-/// t is solved so that ∑ n² wₙ = σ² over the taps that are kept.
+/// t is solved for ∑ n² wₙ = σ² over the truncated taps.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Kernel {
-    /// w₀, w₁ … w_radius; w₋ₙ = wₙ.
+    /// Weights w₀, w₁ … w_radius; w₋ₙ = wₙ.
     pub(crate) taps: Vec<f64>,
-    /// The same for pixels. The centre takes the rounding of the others, so that a constant
-    /// survives to the last bit or two.
+    /// Weights in single precision. The centre absorbs the rounding errors of the others, which preserves constants to
+    /// the last bits.
     pub(crate) half: Vec<f32>,
 }
 
 impl Kernel {
-    /// `sigma` finite and >= 0; less than `lost_tail` of the mass lies beyond the last tap.
+    /// Creates a kernel of `sigma`, finite and >= 0. Its taps omit less than `lost_tail` of the sum.
     pub(crate) fn new(sigma: f64, lost_tail: f64) -> Self {
         let variance = sigma * sigma;
-        // Narrower than this, the side taps vanish even in double precision.
+        // For smaller variances, the side taps underflow in double precision.
         if variance < f64::MIN_POSITIVE {
             return Self::from_taps(vec![1.0]);
         }
         let wide = ample_radius(sigma);
-        // Where s = σ but for 1e-8, the radius needs no more.
+        // s = σ within 1e-8 is accurate enough for the radius.
         let t = if sigma > DENSITY_FROM { 0.5 / variance } else { exponent(variance, wide) };
         let radius = radius_of(&normalised(t, wide), lost_tail);
         Self::from_taps(normalised(exponent(variance, radius), radius))
     }
 
-    /// One wider than a pixel whose fourth cumulant is not 0 but this: an Edgeworth series of one term,
-    /// wₙ ∝ exp(-t n²) (1 + κ₄/24s⁴ · He₄(n/s)). Its variance is exact as well.
+    /// Creates a kernel wider than a pixel with the given fourth cumulant: an Edgeworth series of one term, wₙ ∝ exp(-t
+    /// n²) (1 + κ₄/24s⁴ · He₄(n/s)). Its variance is exact as well.
     pub(crate) fn with_fourth_cumulant(sigma: f64, fourth_cumulant: f64, lost_tail: f64) -> Self {
         let variance = sigma * sigma;
         let radius = radius_of(&normalised(0.5 / variance, ample_radius(sigma)), lost_tail);
         let excess = fourth_cumulant / (24.0 * variance * variance);
         let mut taps = Vec::with_capacity(radius + 1);
         let (mut t, mut mass) = (0.5 / variance, 0.0);
-        // It takes a few steps; the rest is a bound for the loop.
+        // Converges in a few steps; the limit bounds the loop.
         for _ in 0..50 {
             taps.clear();
             mass = 0.0;
@@ -60,7 +59,7 @@ impl Kernel {
                 second += 2.0 * n * n * tap;
             });
             let ratio = second / (mass * variance);
-            // The variance falls as t grows, nearly as 1/t.
+            // The variance falls nearly as 1/t.
             t *= ratio;
             if (ratio - 1.0).abs() < SETTLED {
                 break;
@@ -70,7 +69,7 @@ impl Kernel {
         Self::from_taps(taps)
     }
 
-    #[expect(clippy::cast_possible_truncation, reason = "pixels are single precision")]
+    #[expect(clippy::cast_possible_truncation, reason = "convolution uses single precision")]
     fn from_taps(taps: Vec<f64>) -> Self {
         let mut half: Vec<f32> = taps.iter().map(|&w| w as f32).collect();
         let sides: f64 = half[1..].iter().map(|&w| 2.0 * f64::from(w)).sum();
@@ -83,8 +82,7 @@ impl Kernel {
     }
 }
 
-/// A radius at which the tail is far below `LOST_TAIL`: eight standard deviations, and one lattice
-/// step for the widths that are smaller than one.
+/// Returns a radius with a tail far below `LOST_TAIL`: eight standard deviations, plus two for narrow kernels.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -94,7 +92,7 @@ fn ample_radius(sigma: f64) -> usize {
     2 + (8.0 * sigma).ceil() as usize
 }
 
-/// The smallest radius, at least 1, beyond which less than `lost_tail` lies.
+/// Returns the smallest radius, at least 1, beyond which the taps sum to less than `lost_tail`.
 fn radius_of(taps: &[f64], lost_tail: f64) -> usize {
     let mut tail = 0.0;
     let mut radius = taps.len() - 1;
@@ -113,14 +111,14 @@ fn normalised(t: f64, radius: usize) -> Vec<f64> {
     taps
 }
 
-/// Hands over n and exp(-t n²), from 0 to `radius`.
+/// Calls `visit` with n and exp(-t n²), for n from 0 to `radius`.
 #[inline]
 fn each(t: f64, radius: usize, mut visit: impl FnMut(f64, f64)) {
     if radius > FEW_TAPS {
         (0..=radius).map(|n| n as f64).for_each(|n| visit(n, libm::exp(-t * n * n)));
         return;
     }
-    // The ratios of neighbours, exp(-t (2n + 1)), are a geometric series.
+    // The ratios of neighbours, exp(-t (2n + 1)), form a geometric series.
     let mut ratio = libm::exp(-t);
     let (mut tap, step) = (1.0, ratio * ratio);
     for n in 0..=radius {
@@ -130,11 +128,11 @@ fn each(t: f64, radius: usize, mut visit: impl FnMut(f64, f64)) {
     }
 }
 
-/// The t at which the taps up to `radius` have this variance, by Newton's method on its logarithm.
+/// Returns the t for which the taps up to `radius` have this variance, by Newton's method on its logarithm.
 fn exponent(variance: f64, radius: usize) -> f64 {
-    // Both ends are known: t = 1/(2σ²) for a wide kernel, and for a narrow one w₁ = exp(-t) = σ²/2.
+    // Initial values: t = 1/(2σ²) for a wide kernel; w₁ = exp(-t) = σ²/2 for a narrow one.
     let mut t = if variance > 0.36 { 0.5 / variance } else { libm::log(2.0 / variance) };
-    // It takes two to five steps; the rest is a bound for the loop.
+    // Converges in two to five steps; the limit bounds the loop.
     for _ in 0..50 {
         let (mut mass, mut second, mut fourth) = (1.0, 0.0, 0.0);
         each(t, radius, |n, w| {
@@ -173,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn variance_is_exact_and_taps_are_positive_falling_and_sum_to_one() {
+    fn variance_is_exact_and_taps_are_positive_decreasing_and_normalised() {
         for sigma in [0.05, 0.2, 0.5, 0.6, 0.9, 1.0, 3.6, 20.0, 300.0].into_iter().chain(widths()) {
             let kernel = kernel(sigma);
             let error = variance(&kernel) / (sigma * sigma) - 1.0;
@@ -190,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wide_kernel_is_the_sampled_normal_density() {
+    fn wide_kernels_match_the_sampled_normal_density() {
         for sigma in [1.0, 1.5, 3.6, 20.0_f64] {
             let ratio = (0.5 / exponent(sigma * sigma, ample_radius(sigma))).sqrt() / sigma;
             let bound = if sigma > 1.0 { 1e-8 } else { 1.1e-7 };
@@ -204,8 +202,8 @@ mod tests {
     }
 
     #[test]
-    fn the_kernel_is_continuous_through_focus() {
-        // No tap moves by more than the width itself does, from in focus to far out of it.
+    fn kernel_is_continuous_in_sigma() {
+        // Each tap changes by less than σ does, from in focus to far out of focus.
         let mut before = kernel(0.0);
         for i in 1..4000 {
             let now = kernel(0.002 * f64::from(i));

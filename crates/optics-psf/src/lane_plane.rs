@@ -6,34 +6,34 @@ use portable_numerics::fourier::{LaneFft, transposed};
 
 use crate::grid::signed;
 
-/// Sequences side by side: a cache line of single precision.
+/// Sequences transformed in parallel: one cache line of single precision.
 pub(crate) const LANES: usize = 16;
 
-/// A complex number of each sequence: real parts, imaginary parts. Or two runs of real numbers, one after the other.
+/// A complex number per sequence: real parts, then imaginary parts. Also two runs of real numbers.
 pub(crate) type Lanes = portable_numerics::fourier::Lanes<f32, LANES>;
 
-/// Transforms of all lengths that were asked for.
+/// Cached FFT plans by length.
 pub(crate) type LanePlans = portable_numerics::fourier::Plans<f32>;
 
-/// Columns of an image that are transformed together: two for each lane, as real and imaginary part.
+/// Columns of an image transformed together: two per lane, as real and imaginary part.
 pub(crate) const STRIPE: usize = 2 * LANES;
 
-/// Frequencies of a real image on one side of the spectrum and inside an ellipse: blocks of [`LANES`] frequencies along y,
-/// from 0 on, one in each lane, and in each block kx = 0 … r, −r … −1. Lanes beyond the ellipse hold whatever is there.
+/// Frequencies of a real image, on one half of the spectrum and inside an ellipse. Blocks hold [`LANES`] frequencies
+/// along y, one per lane, for kx = 0 … r, −r … −1. Lanes beyond the ellipse hold unspecified values.
 #[derive(Debug)]
 pub(crate) struct LaneSupport {
-    /// r of each block, and where it begins.
+    /// r and start index of each block.
     reach: Vec<usize>,
     start: Vec<usize>,
-    /// The highest frequency along y.
+    /// Highest frequency along y.
     top: usize,
 }
 
 impl LaneSupport {
-    /// Frequencies up to `radius` cycles per sample on a grid; the highest one of an even side, whose
-    /// sign is ambiguous, never.
+    /// Selects frequencies up to `radius` cycles per sample. The Nyquist frequency of an even size is excluded; its
+    /// sign is ambiguous.
     pub(crate) fn new(width: usize, height: usize, radius: f64) -> Self {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most half a side")]
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most half the grid size")]
         let bins = |cycles: f64, side: usize| ((cycles.max(0.0) * side as f64) as usize).min((side - 1) / 2);
         let top = bins(radius, height);
         let block = |y: usize| {
@@ -57,7 +57,7 @@ impl LaneSupport {
         self.reach[block]
     }
 
-    /// Frequencies in cycles per sample, kx and ky of every lane, in the order of their places.
+    /// Iterates over frequencies in storage order, in cycles per sample: kx and ky of every lane.
     pub(crate) fn frequencies(&self, width: usize, height: usize) -> impl Iterator<Item = [[f64; 2]; LANES]> {
         self.reach.iter().enumerate().flat_map(move |(block, &reach)| {
             (0..=reach).chain(width - reach..width).map(move |x| {
@@ -71,7 +71,7 @@ impl LaneSupport {
         &spectrum[self.start[block]..][..2 * self.reach[block] + 1]
     }
 
-    /// Puts a block of a spectrum in its places in a line.
+    /// Copies a block of a spectrum to its positions in a line.
     fn put(&self, spectrum: &[Lanes], block: usize, line: &mut [Lanes]) {
         let (low, high) = self.block(spectrum, block).split_at(self.reach[block] + 1);
         line[..low.len()].copy_from_slice(low);
@@ -84,7 +84,8 @@ impl LaneSupport {
     }
 }
 
-/// Real images of one size and their spectra, in single precision, by complex FFTs of two columns at a time.
+/// Transforms between real images of one size and their spectra in single precision, by complex FFTs of two columns at
+/// a time.
 #[derive(Debug, Clone)]
 pub(crate) struct LanePlane {
     pub(crate) width: usize,
@@ -96,7 +97,7 @@ pub(crate) struct LanePlane {
 /// Working memory of [`LanePlane`].
 #[derive(Debug, Clone, Default)]
 pub(crate) struct LaneScratch {
-    /// Spectra along y, block by block, from left to right.
+    /// Spectra along y, by block, from left to right.
     turned: Vec<Lanes>,
     stripe: Vec<Lanes>,
     line: Vec<Lanes>,
@@ -108,20 +109,19 @@ impl LanePlane {
         Self { width, height, along_x: plans.get(width), along_y: plans.get(height) }
     }
 
-    /// 1 / samples.
-    #[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 samples")]
+    /// Returns 1 / samples.
+    #[expect(clippy::cast_possible_truncation, reason = "samples use single precision")]
     pub(crate) fn norm(&self) -> f32 {
         (1.0 / (self.width * self.height) as f64) as f32
     }
 
-    /// Samples from the left edge to the end of the last stripe.
+    /// Returns the width rounded up to full stripes.
     fn padded(&self) -> usize {
         self.width.next_multiple_of(STRIPE)
     }
 
-    /// The spectrum of an image on `support`, or an empty one if the image is empty. `fill` sets all rows of the stripe
-    /// of columns from that place on, of which there may be more than the image has and which are 0 then, or says that it
-    /// is empty.
+    /// Computes the spectrum of an image on `support`, or an empty one if the image is empty. `fill` writes all rows of
+    /// the stripe of columns from an index on, with zeros beyond the image, or returns false if the stripe is empty.
     pub(crate) fn forward(
         &self,
         support: &LaneSupport,
@@ -134,10 +134,10 @@ impl LanePlane {
         let LaneScratch { turned, stripe, spare, .. } = &mut *scratch;
         stripe.resize(self.height, ZERO);
         spare.resize(self.height, ZERO);
-        let mut lit = false;
+        let mut nonzero = false;
         for left in (0..padded).step_by(STRIPE) {
             if fill(left, stripe) {
-                lit = true;
+                nonzero = true;
                 self.along_y.process(stripe, spare);
                 split(stripe, support.top, turned, padded, left);
             } else {
@@ -147,12 +147,12 @@ impl LanePlane {
             }
         }
         spectrum.clear();
-        if lit {
+        if nonzero {
             self.finish(support, spectrum, scratch);
         }
     }
 
-    /// From spectra along y to the spectrum.
+    /// Transforms spectra along y to the spectrum.
     fn finish(&self, support: &LaneSupport, spectrum: &mut Vec<Lanes>, scratch: &mut LaneScratch) {
         let LaneScratch { turned, line, spare, .. } = scratch;
         line.resize(self.width, ZERO);
@@ -165,7 +165,7 @@ impl LanePlane {
         }
     }
 
-    /// From a spectrum to spectra along y.
+    /// Transforms a spectrum to spectra along y.
     fn begin(&self, support: &LaneSupport, mut fill: impl FnMut(usize, &mut [Lanes]), scratch: &mut LaneScratch) {
         let padded = self.padded();
         scratch.turned.resize(support.blocks() * padded, ZERO);
@@ -176,7 +176,7 @@ impl LanePlane {
             line.fill(ZERO);
             fill(k, line);
             self.along_x.process(line, spare);
-            // The inverse transform is the forward one of the reversed sequence, or that reversed.
+            // The inverse transform equals the forward transform of the reversed sequence, and its reversed result.
             block[0] = line[0];
             for (to, from) in block[1..].iter_mut().zip(line[1..].iter().rev()) {
                 *to = *from;
@@ -185,8 +185,8 @@ impl LanePlane {
         }
     }
 
-    /// The image of a spectrum, times the number of samples. `fill` adds block after block of the spectrum, kx = 0 … and …
-    /// −1, to zeros; `visit` gets all rows of stripe after stripe of columns as far as the first `columns` go.
+    /// Computes the image of a spectrum, times the number of samples. `fill` adds one block of the spectrum, kx = 0 …
+    /// and … −1, to zeros. `visit` receives all rows of each stripe that covers the first `columns`.
     pub(crate) fn inverse(
         &self,
         support: &LaneSupport,
@@ -206,7 +206,7 @@ impl LanePlane {
         }
     }
 
-    /// As far as the first `columns` go, the image of a spectrum, times the number of samples.
+    /// Writes the first `columns` of the image of a spectrum, times the number of samples.
     pub(crate) fn image_into(
         &self,
         support: &LaneSupport,
@@ -226,7 +226,7 @@ impl LanePlane {
         self.inverse(support, fill, columns, keep, scratch);
     }
 
-    /// The spectrum of what `map` makes of the image of a spectrum, times the number of samples.
+    /// Computes the spectrum of `map(image)`, for the image of a spectrum times the number of samples.
     pub(crate) fn mapped(
         &self,
         support: &LaneSupport,
@@ -254,13 +254,13 @@ impl LanePlane {
 
 type Square = portable_numerics::fourier::Square<f32, LANES>;
 
-/// Not by `map`, which is a function of its own, without vectors.
+/// Separate calls: `map` would become a function without vector instructions.
 #[inline(always)]
 fn all_transposed([a, b, c, d]: &[Square; 4]) -> [Square; 4] {
     [transposed(a), transposed(b), transposed(c), transposed(d)]
 }
 
-/// Puts the spectra of a stripe of real columns in their places: frequencies up to `top`, side by side.
+/// Splits the spectra of a stripe of real columns, up to the frequency `top`, and stores them next to each other.
 #[multiversion(targets = "simd")]
 fn split(stripe: &[Lanes], top: usize, turned: &mut [Lanes], padded: usize, left: usize) {
     for (block, turned) in turned.chunks_exact_mut(padded).take(top / LANES + 1).enumerate() {
@@ -286,7 +286,7 @@ fn split(stripe: &[Lanes], top: usize, turned: &mut [Lanes], padded: usize, left
     }
 }
 
-/// Gathers a stripe's spectra along y, reversed, so that a forward transform leads to the image.
+/// Combines the spectra along y of a stripe, reversed, so that a forward transform gives the image.
 #[multiversion(targets = "simd")]
 fn join(turned: &[Lanes], padded: usize, left: usize, top: usize, stripe: &mut [Lanes]) {
     let height = stripe.len();
@@ -321,7 +321,7 @@ mod tests {
     use rand_xoshiro::Xoshiro256PlusPlus;
     use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-    /// One frequency after the other.
+    /// Reference: one frequency at a time.
     fn oracle(image: &[f32], width: usize, [fx, fy]: [f64; 2]) -> [f64; 2] {
         let mut sum = [0.0; 2];
         for (i, &v) in image.iter().enumerate() {
@@ -344,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn spectra_are_the_sums_and_come_back() {
+    fn spectra_match_direct_sums_and_round_trip() {
         for (width, height, radius) in [(27, 39, 0.3), (90, 75, 0.26), (40, 98, 9.0), (33, 1, 0.2)] {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x5EC7);
             let mut number = || (rng.next_u32() >> 8) as f32 / 16_777_216.0;
@@ -357,7 +357,7 @@ mod tests {
             let (mut spectrum, mut scratch) = (Vec::new(), LaneScratch::default());
             plane.forward(&support, fill(&image, width), &mut spectrum, &mut scratch);
             let inside = |x: f64, y: f64| x * x + y * y <= radius * radius;
-            // Sums, and what is kept inside the ellipse.
+            // Direct sums, and the coefficients inside the ellipse.
             let mut kept = vec![ZERO; spectrum.len()];
             let mut known = Vec::new();
             for block in 0..support.blocks() {
@@ -381,7 +381,7 @@ mod tests {
                 let error = (f64::from(value[0][l]) - re).abs() + (f64::from(value[1][l]) - im).abs();
                 assert!(error < 4e-4, "{f:?}: {error}");
             }
-            // The image of what was kept has the same spectrum there.
+            // The image of these coefficients has the same spectrum there.
             let mut back = vec![0.0; image.len()];
             plane.image_into(&support, &kept, width, &mut back, &mut scratch);
             for &(block, i, l, f) in known.iter().step_by(7) {

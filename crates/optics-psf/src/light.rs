@@ -2,11 +2,12 @@ use multiversion::multiversion;
 
 use crate::{Factor, Lattice, Microscope};
 
-/// The light of a picture, as the product of what many things let through.
+/// The transmitted light of an image: the product of the transmission factors of many objects.
 ///
-/// Factors on the object's lattice are multiplied there, and those on the camera's with the mean over each pixel.
+/// Factors on the object's lattice are multiplied there and averaged per pixel at the end. Factors on the camera's
+/// lattice are multiplied per pixel.
 #[derive(Debug, Clone, Default)]
-pub struct Light {
+pub struct TransmittedLight {
     oversampling: usize,
     width_px: usize,
     stray_light: f64,
@@ -14,8 +15,8 @@ pub struct Light {
     camera: Vec<f32>,
 }
 
-impl Light {
-    /// The light of empty slide.
+impl TransmittedLight {
+    /// Creates the light of an empty slide.
     #[must_use]
     pub fn new(microscope: &Microscope, width_px: usize, height_px: usize) -> Self {
         let mut light = Self::default();
@@ -23,7 +24,7 @@ impl Light {
         light
     }
 
-    /// Makes it the light of empty slide, perhaps of another microscope and size, in the memory it has.
+    /// Resets to the light of an empty slide, possibly of another microscope and size, and reuses the memory.
     pub fn reset(&mut self, microscope: &Microscope, width_px: usize, height_px: usize) {
         let params = microscope.params();
         (self.oversampling, self.width_px, self.stray_light) = (params.oversampling, width_px, params.stray_light);
@@ -36,14 +37,14 @@ impl Light {
         }
     }
 
-    /// Empties the slide.
+    /// Resets to the light of an empty slide.
     pub fn clear(&mut self) {
         self.object.fill(1.0);
         self.camera.fill(1.0);
     }
 
-    /// Multiplies by what a patch lets through. `at_px` is the pixel of the patch's upper left corner, without
-    /// the margin, anywhere inside the picture or outside.
+    /// Multiplies by the factor of a patch. `at_px` is the pixel position of the patch's upper left corner, without the
+    /// margin. Parts outside of the image are ignored.
     pub fn multiply(&mut self, factor: &Factor, at_px: [i64; 2]) {
         let (light, scale) = match factor.lattice {
             Lattice::Object => (&mut self.object, self.oversampling),
@@ -66,17 +67,17 @@ impl Light {
         }
     }
 
-    /// The picture: the light of each pixel of the camera relative to that of empty slide, stray light included.
+    /// Writes the image: the intensity at each camera pixel relative to an empty slide, including stray light.
     ///
     /// # Panics
     ///
-    /// If `out` has not as many pixels as the light.
-    pub fn picture_into(&self, out: &mut [f32]) {
+    /// If `out` does not have as many pixels as the image.
+    pub fn image_into(&self, out: &mut [f32]) {
         out.copy_from_slice(&self.camera);
         if self.width_px > 0 {
             mean_of_pixels(&self.object, self.width_px * self.oversampling, self.oversampling, out);
         }
-        lift(out, self.stray_light);
+        add_stray_light(out, self.stray_light);
     }
 }
 
@@ -85,8 +86,9 @@ fn times(light: &mut [f32], values: &[f32]) {
     light.iter_mut().zip(values).for_each(|(light, value)| *light *= value);
 }
 
-/// Of `len` places from `at` on, which may be negative, those among `side`: the first, its place, and how many.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and a side")]
+/// Returns the part of `at..at + len` inside `0..side`: its start in the source, its start in the target, and its
+/// length.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to `side`")]
 fn overlap(at: i64, len: usize, side: usize) -> (usize, usize, usize) {
     let first = (-at).max(0);
     let end = (side as i64 - at).min(len as i64);
@@ -115,9 +117,9 @@ pub(crate) fn mean_of_pixels(samples: &[f32], width: usize, oversampling: usize,
     }
 }
 
-/// Adds stray light, that share of the light of empty slide.
-#[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 pixels")]
-pub(crate) fn lift(out: &mut [f32], stray_light: f64) {
+/// Adds stray light, as a fraction of the light of an empty slide.
+#[expect(clippy::cast_possible_truncation, reason = "pixels use single precision")]
+pub(crate) fn add_stray_light(out: &mut [f32], stray_light: f64) {
     if stray_light > 0.0 {
         let (stray, rest) = (stray_light as f32, (1.0 - stray_light) as f32);
         for light in out {

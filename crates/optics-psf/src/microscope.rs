@@ -1,20 +1,20 @@
 use crate::error::{Error, require, within};
-use crate::lens::Rules;
+use crate::overlap::QuadratureRules;
 use crate::params::{MicroscopeParams, Zernike};
 use crate::pupil::Pupil;
 
-/// A bright-field microscope whose parameters are in order.
+/// A bright-field microscope with validated parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Microscope {
     params: MicroscopeParams,
 }
 
 impl Microscope {
-    /// Checks the parameters.
+    /// Creates a microscope from validated parameters.
     ///
     /// # Errors
     ///
-    /// If a number is not finite or outside the range its field states.
+    /// If a number is not finite or out of the range of its field.
     pub fn new(params: &MicroscopeParams) -> Result<Self, Error> {
         let p = params;
         within("mount_index", p.mount_index, 1.0..=3.0, "a number from 1 to 3")?;
@@ -40,81 +40,80 @@ impl Microscope {
         }
         within("pixel_um", p.pixel_um, 0.001..=100.0, "a number from 0.001 to 100")?;
         within("oversampling", p.oversampling as f64, 1.0..=16.0, "a whole number from 1 to 16")?;
-        let glare = (0.0..1.0).contains(&p.stray_light);
-        require("stray_light", p.stray_light, glare, "0 or more and below 1")?;
+        let in_range = (0.0..1.0).contains(&p.stray_light);
+        require("stray_light", p.stray_light, in_range, "at least 0 and below 1")?;
         Ok(Self { params: params.clone() })
     }
 
-    /// What it was made from.
+    /// Returns the parameters of the microscope.
     #[must_use]
     pub fn params(&self) -> &MicroscopeParams {
         &self.params
     }
 
-    /// The distance between two samples of the rendered object, µm.
+    /// Returns the distance between object samples, in µm.
     #[must_use]
     pub fn pitch_um(&self) -> f64 {
         self.params.pixel_um / self.params.oversampling as f64
     }
 
-    /// The finest detail that reaches the image to first order, cycles per µm: (NA + NAc)/λ at the
-    /// blue end of the band.
+    /// Returns the cutoff frequency to first order, in cycles per µm: (NA + NAc)/λ at the short-wavelength end of the
+    /// band.
     #[must_use]
     pub fn cutoff(&self) -> f64 {
         let shortest = self.params.wavelength_um - 0.5 * self.params.bandwidth_um;
         Pupil::new(&self.params, shortest, 0.0, 0.0).cutoff()
     }
 
-    /// The error of the wavefront at a point of the pupil, in waves, for the middle of the band.
-    /// The point is a direction: its numerical apertures along x and y, together at most `na`.
+    /// Returns the wavefront error at a point of the pupil, in waves, at the centre of the band. The point is given by
+    /// its numerical apertures along x and y, together at most `na`.
     ///
-    /// W = −depth·γ_n + stage·γ_1 + Gibson and Lanni's cover glass + Zernike, with
-    /// γ_n(f) = √((n/λ)² − f²), each zero in the centre; `depth_um` and `stage_um` as for
-    /// [`Microscope::transfer`].
+    /// W = −depth·γ_n + stage·γ_1 + Gibson and Lanni's cover glass + Zernike, with γ_n(f) = √((n/λ)² − f²), each zero
+    /// at the centre. See [`Microscope::transfer`] for `depth_um` and `stage_um`.
     #[must_use]
     pub fn waves(&self, direction: [f64; 2], depth_um: f64, stage_um: f64) -> f64 {
         let wavelength = self.params.wavelength_um;
         Pupil::new(&self.params, wavelength, depth_um, stage_um).waves(direction.map(|d| d / wavelength))
     }
 
-    /// The radius of the geometric blur of a point at that depth, µm: where the rim of the
-    /// condenser's cone meets the plane in focus.
+    /// Returns the radius of the geometric blur of a point at a depth, in µm: the radius of the condenser's cone in the
+    /// focal plane.
     #[must_use]
     pub fn cone_radius_um(&self, depth_um: f64, stage_um: f64) -> f64 {
         Pupil::new(&self.params, self.params.wavelength_um, depth_um, stage_um).cone_radius()
     }
 
-    /// The same with all aberrations, wherever on the condenser's disc it is widest.
-    pub(crate) fn spread_um(&self, depth_um: f64, stage_um: f64) -> f64 {
+    /// Returns the largest blur radius including aberrations, over the condenser's disc.
+    pub(crate) fn max_blur_radius_um(&self, depth_um: f64, stage_um: f64) -> f64 {
         let pupil = Pupil::new(&self.params, self.params.wavelength_um, depth_um, stage_um);
         pupil.steepest(pupil.condenser).max(pupil.cone_radius())
     }
 
-    /// How far something at that depth is from focus, µm of mountant; positive below the plane in focus.
+    /// Returns the defocus of a depth, in µm of mountant, positive below the focal plane.
     pub(crate) fn defocus_um(&self, depth_um: f64, stage_um: f64) -> f64 {
         stage_um * self.params.mount_index / self.params.immersion_index - depth_um
     }
 
-    /// Wavelengths of the band, µm, and their weights, which sum to 1.
+    /// Returns the wavelengths of the band, in µm, and their weights, which sum to 1.
     pub(crate) fn bands(&self) -> Vec<(f64, f64)> {
-        let (middle, width) = (self.params.wavelength_um, self.params.bandwidth_um);
+        let (centre, width) = (self.params.wavelength_um, self.params.bandwidth_um);
         if width == 0.0 {
-            return vec![(middle, 1.0)];
+            return vec![(centre, 1.0)];
         }
-        let shift = 0.5 * width / middle * (self.params.na / self.params.condenser_na).max(1.0);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small, and cut by the rule")]
+        let shift = 0.5 * width / centre * (self.params.na / self.params.condenser_na).max(1.0);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small, and limited by the rule")]
         let nodes = 2 * (BAND_NODES[0] + BAND_NODES[1] * shift).ceil() as usize;
-        let mut rules = Rules::default();
+        let mut rules = QuadratureRules::default();
         let rule = rules.get(nodes).iter();
-        rule.map(|&[x, weight]| (middle + width * (x - 0.5), weight)).collect()
+        rule.map(|&[x, weight]| (centre + width * (x - 0.5), weight)).collect()
     }
 }
 
-/// Pairs of wavelengths: so many, and so many more for each width of the condenser's disc by which the band shifts the
-/// objective's rim. Transfer functions are then within 0.002 up to 10 µm from focus.
+/// Pairs of wavelengths: a minimum, and the number per diameter of the condenser's disc by which the band shifts the
+/// objective's rim. The error of transfer functions is below 0.002 up to 10 µm from focus.
 const BAND_NODES: [f64; 2] = [0.7, 4.0];
 
-/// A distance from the focal plane, µm: farther away nothing of an object is left.
+/// Validates a distance from the focal plane, in µm. Nothing of an object is visible farther away.
 pub(crate) fn distance(field: &'static str, value: f64) -> Result<f64, Error> {
     within(field, value, -1000.0..=1000.0, "a number from -1000 to 1000")
 }

@@ -2,41 +2,40 @@ use core::f64::consts::TAU;
 
 use crate::params::{MicroscopeParams, Zernike};
 
-/// Refractive index of cover glasses at the sodium line (ISO 8255 asks for 1.5255 ± 0.0015; that
-/// and the mountant's 1.515 are the same to within 1 % of the effect).
+/// Refractive index of cover glasses at the sodium line. ISO 8255 specifies 1.5255 ± 0.0015; the difference to 1.515
+/// changes the effect by less than 1 %.
 const COVER_INDEX: f64 = 1.515;
 
-/// Rounding at the rim: a frequency on it counts as inside, cycles/µm.
+/// Tolerance in cycles/µm: frequencies on the rim count as inside.
 pub(crate) const RIM: f64 = 1e-9;
 
-/// The objective's pupil for one wavelength, depth and travel of the stage; frequencies in
-/// cycles/µm, phases in waves.
+/// The objective's pupil for one wavelength, depth and stage position. Frequencies are in cycles/µm, phases in waves.
 #[derive(Debug, Clone)]
 pub(crate) struct Pupil {
-    /// NA/λ, and the condenser's, at most the same.
+    /// NA/λ of the objective, and of the condenser, limited to the objective's.
     pub(crate) objective: f64,
     pub(crate) condenser: f64,
-    /// The ways of the light: W = Σ t·γ.
-    media: [Way; 4],
+    /// Optical paths: W = Σ t·γ.
+    media: [OpticalPath; 4],
     has_cover: bool,
     zernike: Zernike,
     has_zernike: bool,
 }
 
 impl Pupil {
-    /// `depth_um`: depth of the object about the focal plane, in the mountant, positive towards the objective; `stage_um`:
-    /// how far the stage was lowered from the lens.
+    /// Creates a pupil. `depth_um` is the depth of the object in the mountant relative to the focal plane, positive
+    /// towards the objective. `stage_um` is the distance by which the stage was lowered.
     pub(crate) fn new(params: &MicroscopeParams, wavelength_um: f64, depth_um: f64, stage_um: f64) -> Self {
-        let way = |length, index| Way::new(length, index, wavelength_um);
-        // Gibson and Lanni, DOI 10.1364/JOSAA.8.001601: δ (γ_g − (n_i/n_g) γ_i), the glass and the
-        // immersion it displaces when paraxial rays are focused again.
+        let path = |length, index| OpticalPath::new(length, index, wavelength_um);
+        // Gibson and Lanni, DOI 10.1364/JOSAA.8.001601: δ (γ_g − (n_i/n_g) γ_i), the excess glass and the immersion
+        // layer it displaces after paraxial refocusing.
         let cover = params.cover_error_um;
         let media = [
-            // The only place where the sign turns: light's way through the mountant is longer from below the focal plane.
-            way(-depth_um, params.mount_index),
-            way(stage_um, params.immersion_index),
-            way(cover, COVER_INDEX),
-            way(-cover * params.immersion_index / COVER_INDEX, params.immersion_index),
+            // The only change of sign: the path through the mountant is longer from below the focal plane.
+            path(-depth_um, params.mount_index),
+            path(stage_um, params.immersion_index),
+            path(cover, COVER_INDEX),
+            path(-cover * params.immersion_index / COVER_INDEX, params.immersion_index),
         ];
         let objective = params.na / wavelength_um;
         Self {
@@ -57,19 +56,19 @@ impl Pupil {
         self.zernike.is_round()
     }
 
-    /// Whether light of this square of the frequency passes.
+    /// Returns whether a squared frequency passes the pupil.
     pub(crate) fn passes(&self, f2: f64) -> bool {
         let rim = self.objective + RIM;
         f2 <= rim * rim
     }
 
-    /// depth·γ_n alone: the way through the mountant.
+    /// Returns depth·γ_n, the path through the mountant.
     #[inline]
     pub(crate) fn medium_waves(&self, f2: f64) -> f64 {
         self.media[0].waves(f2)
     }
 
-    /// W of the terms without direction.
+    /// Returns W of the rotationally symmetric terms.
     #[inline(always)]
     pub(crate) fn round_waves(&self, f2: f64) -> f64 {
         let mut waves = self.media[0].waves(f2) + self.media[1].waves(f2);
@@ -82,16 +81,20 @@ impl Pupil {
         waves
     }
 
-    /// W, all of it, at a frequency.
+    /// Returns the complete W at a frequency.
     #[inline]
     pub(crate) fn waves(&self, [x, y]: [f64; 2]) -> f64 {
         let round = self.round_waves(x * x + y * y);
-        if self.is_round() { round } else { round + self.zernike.sided_waves([x / self.objective, y / self.objective]) }
+        if self.is_round() {
+            round
+        } else {
+            round + self.zernike.asymmetric_waves([x / self.objective, y / self.objective])
+        }
     }
 
-    /// About the steepest slope |dW/df| up to a frequency, in µm.
+    /// Returns the approximate largest slope |dW/df| up to a frequency, in µm.
     pub(crate) fn steepest(&self, radius: f64) -> f64 {
-        /// Points along a radius.
+        /// Samples along a radius.
         const POINTS: usize = 33;
         let step = radius / (POINTS - 1) as f64;
         let directions = if self.is_round() { &DIRECTIONS[..1] } else { &DIRECTIONS[..] };
@@ -103,7 +106,7 @@ impl Pupil {
         slopes.fold(0.0, f64::max)
     }
 
-    /// The slope |dW/df| of the media at the rim of the condenser: how far in µm its rays miss.
+    /// Returns the slope |dW/df| of the media at the condenser's rim: the lateral displacement of its rays, in µm.
     pub(crate) fn cone_radius(&self) -> f64 {
         (self.media[0].slope(self.condenser) + self.media[1].slope(self.condenser)).abs()
     }
@@ -115,39 +118,38 @@ const DIRECTIONS: [[f64; 2]; 8] = {
     [[1.0, 0.0], [D, D], [0.0, 1.0], [-D, D], [-1.0, 0.0], [-D, -D], [0.0, -1.0], [D, -D]]
 };
 
-/// A way through a medium: its length in µm and n/λ, with its square.
+/// A path through a medium: its length in µm, n/λ and its square.
 #[derive(Debug, Clone, Copy)]
-struct Way {
+struct OpticalPath {
     length: f64,
     k: f64,
     k2: f64,
 }
 
-impl Way {
+impl OpticalPath {
     fn new(length: f64, index: f64, wavelength_um: f64) -> Self {
         let k = index / wavelength_um;
         Self { length, k, k2: k * k }
     }
 
-    /// t (γ(f) − γ(0)) with γ(f) = √(k² − f²).
+    /// Returns t (γ(f) − γ(0)) with γ(f) = √(k² − f²).
     #[inline(always)]
     fn waves(self, f2: f64) -> f64 {
         self.length * ((self.k2 - f2).max(0.0).sqrt() - self.k)
     }
 
-    /// Its slope along f.
+    /// Returns the slope along f.
     fn slope(self, f: f64) -> f64 {
         -self.length * f / (self.k2 - f * f).max(f64::MIN_POSITIVE).sqrt()
     }
 }
 
-/// cos 2πx and sin 2πx.
+/// Returns cos 2πx and sin 2πx.
 ///
-/// Polynomials on an eighth of a turn, without branches so that loops over it become vector code;
-/// the error is below 1e-14.
+/// Polynomials on an eighth of a turn, without branches, so that loops vectorise. The error is below 1e-14.
 #[inline(always)]
 pub(crate) fn turn(x: f64) -> (f64, f64) {
-    /// Adding it leaves a double no digits after the point.
+    /// Adding it rounds a double to an integer.
     const WHOLE: f64 = 6_755_399_441_055_744.0;
     let x = x - ((x + WHOLE) - WHOLE);
     // x = quarter/4 + rest, |rest| <= 1/8.
@@ -178,11 +180,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn turn_is_cosine_and_sine() {
+    fn turn_matches_cosine_and_sine() {
         for i in -40_000..40_000 {
             let x = f64::from(i) * 1.23e-3;
             let (c, s) = turn(x);
-            // 2πx of the library call is rounded.
+            // The library call rounds 2πx.
             assert!((c - libm::cos(TAU * x)).abs() < 3e-14 + 2e-16 * x.abs() * TAU, "{x}");
             assert!((s - libm::sin(TAU * x)).abs() < 3e-14 + 2e-16 * x.abs() * TAU, "{x}");
         }

@@ -1,38 +1,36 @@
-//! The decimated path for wide kernels: halve, blur what is small, double.
+//! Decimated convolution for wide kernels: downsample, blur the small image, upsample.
 //!
-//! Each halving weighs with 1 6 15 20 15 6 1 (variance 3/2) and each doubling with the same taps, which is
-//! quintic B-spline subdivision. On their own lattices all of them have the same variance at every
-//! phase, so variances add without an error: with d halvings the impulse response has
-//! 4ᵈ - 1 from the two ways and 4ᵈ·s² from the kernel of width s between them. Fourth cumulants add as
-//! well: that of the two ways is -(16ᵈ - 1)/10, and the kernel between them has what makes up for it.
-//! What is left is what folds back.
+//! Downsampling and upsampling use the weights 1 6 15 20 15 6 1 (variance 3/2), quintic B-spline subdivision. Their
+//! variance is the same at every phase, so variances add exactly: for d halvings the impulse response has 4ᵈ - 1 from
+//! resampling and 4ᵈ·s² from the kernel of width s. Fourth cumulants add as well: resampling contributes -(16ᵈ - 1)/10,
+//! which the kernel compensates. The remaining error is aliasing.
 
 use crate::fir::{self, Source};
 use crate::kernel::Kernel;
 use crate::{Border, Scratch};
 
-/// The least width, in its own pixels, of the kernel between the two ways. It bounds what folds
-/// back to below 1e-3 of the range, whatever the image: 4.4e-4 along each axis at one halving, less at more.
+/// Smallest σ of the kernel on the small image, in its pixels. Aliasing is then below 1e-3 of the range for every
+/// image: 4.4e-4 along each axis for one halving, less for more.
 pub(crate) const NARROWEST: f64 = 1.1;
 
-/// The same for errors below 2e-4: 9e-5 along each axis.
+/// Smallest σ for errors below 2e-4 of the range: 9e-5 along each axis.
 pub(crate) const NARROWEST_BY_DEFAULT: f64 = 1.5;
 
-/// Beyond this, more halvings save nothing.
+/// Largest number of halvings; more save no time.
 const MOST_HALVINGS: u32 = 6;
 
-/// How a wide kernel is split into halvings and what is left to do on the small image.
+/// Split of a wide kernel into halvings and a kernel on the small image.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Pyramid {
     halvings: usize,
     kernel: Kernel,
-    /// Pixels that surround the image while it is halved, for each border.
-    reach_of_nothing: usize,
-    reach: usize,
+    /// Pixels of padding around the image, for zero and for other borders.
+    zero_padding: usize,
+    padding: usize,
 }
 
 impl Pyramid {
-    /// None where the kernel is too narrow to be halved even once.
+    /// Returns `None` if the kernel is too narrow for one halving.
     pub(crate) fn new(sigma: f64, narrowest: f64, radius: usize, lost_tail: f64) -> Option<Self> {
         let split = |halvings: u32| {
             let area = f64::from(4_u32.pow(halvings));
@@ -44,17 +42,17 @@ impl Pyramid {
         Some(Self {
             halvings,
             kernel: Kernel::with_fourth_cumulant(rest, fourth_cumulant, lost_tail),
-            // The taps of all halvings, or of all doublings, reach less than three small pixels.
-            reach_of_nothing: 3 * step,
-            reach: (radius + 3 * step).next_multiple_of(step),
+            // The taps of all halvings or doublings together reach less than three small pixels.
+            zero_padding: 3 * step,
+            padding: (radius + 3 * step).next_multiple_of(step),
         })
     }
 
     /// Blurs `source` into `dst`, which is larger by `margin` on each side.
     pub(crate) fn blur(&self, source: Source<'_>, margin: usize, dst: &mut [f32], scratch: &mut Scratch) {
         let reach = match source.border {
-            Border::Zero => self.reach_of_nothing,
-            Border::Reflect | Border::Replicate => self.reach,
+            Border::Zero => self.zero_padding,
+            Border::Reflect | Border::Replicate => self.padding,
         };
         let step = 1 << self.halvings;
         let full = |side: usize| (side + 2 * (margin + reach)).next_multiple_of(step);
@@ -68,14 +66,14 @@ impl Pyramid {
             level.resize((width >> l) * (height >> l), 0.0);
             let (source, before) = match l {
                 1 => (source, margin + reach),
-                _ => (alone(&above[l - 1], width >> (l - 1)), 0),
+                _ => (zero_bordered(&above[l - 1], width >> (l - 1)), 0),
             };
             halve(source, before, level, width >> l, &mut scratch.line);
         }
 
         let (least, mut small) = (self.halvings, core::mem::take(&mut levels[0]));
         small.resize(levels[least].len(), 0.0);
-        let coarse = alone(&levels[least], width >> least);
+        let coarse = zero_bordered(&levels[least], width >> least);
         fir::blur(coarse, &self.kernel.half, 0, 0, &mut small, scratch);
         levels[0] = small;
         levels.swap(0, least);
@@ -90,13 +88,13 @@ impl Pyramid {
     }
 }
 
-/// A small image, with nothing around it that could matter.
-fn alone(pixels: &[f32], width: usize) -> Source<'_> {
+/// Returns a small image with a zero border, which is large enough to have no effect.
+fn zero_bordered(pixels: &[f32], width: usize) -> Source<'_> {
     Source { pixels, width, border: Border::Zero }
 }
 
-/// Every second pixel of `source`, counted from `before` pixels above and to the left of its
-/// first one, of what 1 6 15 20 15 6 1 makes of it.
+/// Filters `source` with 1 6 15 20 15 6 1 and keeps every second pixel, starting `before` pixels above and to the left
+/// of its first pixel.
 #[multiversion::multiversion(targets = "simd")]
 fn halve(source: Source<'_>, before: usize, out: &mut [f32], width: usize, line: &mut Vec<f32>) {
     /// Weights at ±3, ±2, ±1 and 0.
@@ -135,26 +133,26 @@ fn halve(source: Source<'_>, before: usize, out: &mut [f32], width: usize, line:
     }
 }
 
-/// Pairs of equal weight are added before they are weighed, as the taps are symmetric.
+/// Adds pixels of equal weight before weighting.
 #[inline(always)]
-fn folded(out: &mut [f32], pairs: [[&[f32]; 2]; 3], middle: &[f32], weights: [f32; 4]) {
+fn folded(out: &mut [f32], pairs: [[&[f32]; 2]; 3], centre: &[f32], weights: [f32; 4]) {
     let n = out.len();
     let [[a, g], [b, f], [c, e]] = pairs;
-    let (a, b, c, d, e, f, g) = (&a[..n], &b[..n], &c[..n], &middle[..n], &e[..n], &f[..n], &g[..n]);
+    let (a, b, c, d, e, f, g) = (&a[..n], &b[..n], &c[..n], &centre[..n], &e[..n], &f[..n], &g[..n]);
     for i in 0..n {
         let outer = weights[0] * (a[i] + g[i]) + weights[1] * (b[i] + f[i]);
         out[i] = outer + weights[2] * (c[i] + e[i]) + weights[3] * d[i];
     }
 }
 
-/// Quintic B-spline subdivision: twice as many pixels along each side, of which those from `skip`
-/// (even) on, along both, go to `out`.
+/// Quintic B-spline subdivision: doubles width and height. `out` receives the pixels from the even index `skip` on,
+/// along both axes.
 #[multiversion::multiversion(targets = "simd")]
 fn double(small: &[f32], small_width: usize, out: &mut [f32], width: usize, skip: usize, line: &mut Vec<f32>) {
     let rows = (small.len() / small_width).cast_signed();
     line.clear();
     line.resize(2 * small_width + 3, 0.0);
-    // Beyond the image is nothing: a row of it, and pixels before and behind every row.
+    // Zeros outside of the image: one row, and pixels before and after every row.
     let (nothing, line) = line.split_at_mut(small_width);
     for (y, out) in out.chunks_exact_mut(width).enumerate() {
         let y = y + skip;
@@ -187,13 +185,13 @@ fn double(small: &[f32], small_width: usize, out: &mut [f32], width: usize, skip
     }
 }
 
-/// The value where the middle one of three small pixels lies.
+/// Returns the value at the position of the central one of three small pixels.
 #[inline(always)]
 fn on(before: f32, here: f32, after: f32) -> f32 {
     6.0 / 32.0 * (before + after) + 20.0 / 32.0 * here
 }
 
-/// The value between the middle ones of four small pixels.
+/// Returns the value between the two central ones of four small pixels.
 #[inline(always)]
 fn between(a: f32, b: f32, c: f32, d: f32) -> f32 {
     1.0 / 32.0 * (a + d) + 15.0 / 32.0 * (b + c)

@@ -4,43 +4,42 @@ use std::sync::Arc;
 use multiversion::multiversion;
 
 use crate::error::Error;
-use crate::lens::Lens;
 use crate::microscope::{Microscope, distance};
+use crate::overlap::OverlapIntegral;
 use crate::pupil::Pupil;
 
-/// Samples from frequency 0 to the cutoff: linear interpolation errs by less than 6e-4.
+/// Samples from frequency 0 to the cutoff; the error of linear interpolation is below 6e-4.
 const SAMPLES: usize = 401;
-/// The same where the pupil is not round, and directions around.
-pub(crate) const SIDED_SAMPLES: usize = 129;
+/// Samples per direction, and directions, for asymmetric pupils.
+pub(crate) const ASYMMETRIC_SAMPLES: usize = 129;
 const DIRECTIONS: usize = 64;
 
-/// Weak-object transfer functions: how detail of one frequency, at one depth, reaches the image.
+/// Weak-object transfer functions: the transfer of detail from a frequency and depth to the image.
 ///
-/// An object that absorbs A and delays light by φ rad, both small, gives the intensity
-/// 1 − ln 10 · H_A ⊗ A − 2 H_P ⊗ φ, with
+/// An object of small absorbance A and phase delay φ in radians gives the intensity 1 − ln 10 · H_A ⊗ A − 2 H_P ⊗ φ,
+/// with
 ///
 /// H_A(f) = 1/S₀ ∫ circ(|s + f|) cos 2π[W(s + f) − W(s)] ds and
-/// H_P(f) = 1/S₀ ∫ circ(|s + f|) sin 2π[W(s + f) − W(s)] ds,
+/// H_P(f) = 1/S₀ ∫ circ(|s + f|) sin 2π[W(s + f) − W(s)] ds.
 ///
-/// the integrals over the part of the condenser's disc inside the objective's, whose area is S₀,
-/// and circ the objective's aperture NA/λ (slices of Streibl's three-dimensional transfer
-/// functions, DOI 10.1364/JOSAA.2.000121). With coma or astigmatism they depend on direction, and
-/// with coma they are complex; they are averaged over the band of wavelengths.
+/// The integrals cover the part of the condenser's disc inside the objective's, of area S₀; circ is the objective's
+/// aperture NA/λ (slices of Streibl's three-dimensional transfer functions, DOI 10.1364/JOSAA.2.000121). With coma or
+/// astigmatism they depend on the direction; with coma they are complex. They are averaged over the wavelength band.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transfer {
-    /// Distance between the entries of the table, cycles/µm.
+    /// Frequency step of the table, in cycles/µm.
     pub(crate) step: f64,
-    /// (H_A, H_P), complex, at multiples of the step: one row of frequencies, or one for each direction around the circle.
+    /// (H_A, H_P), complex, at multiples of the step: one row, or one row per direction.
     pub(crate) table: Vec<[[f64; 2]; 2]>,
 }
 
 impl Microscope {
-    /// How the microscope transfers detail: see [`Transfer`].
+    /// Computes the transfer functions at a depth and stage position: see [`Transfer`].
     ///
-    /// `depth_um` is the depth of the detail about the focal plane of the stage at rest, in the mountant, positive
-    /// towards the objective; `stage_um` how far the stage was then lowered from the objective, in the immersion medium.
-    /// Both blur, and they are not the same: to focus on what lies d nearer to the objective, the stage is lowered by
-    /// about d / `mount_index` if the lens is dry.
+    /// `depth_um` is the depth in the mountant relative to the focal plane with the stage at rest, positive towards the
+    /// objective. `stage_um` is the distance by which the stage was lowered from the objective, in the immersion
+    /// medium. The two differ: to focus on an object d closer to a dry objective, lower the stage by about d /
+    /// `mount_index`.
     ///
     /// # Errors
     ///
@@ -56,14 +55,14 @@ impl Transfer {
         let pupil = |wavelength| Pupil::new(microscope.params(), wavelength, depth_um, stage_um);
         let bands = microscope.bands().into_iter();
         let pupils: Vec<(Pupil, f64)> = bands.map(|(wavelength, weight)| (pupil(wavelength), weight)).collect();
-        let mut lens = Lens::default();
+        let mut overlap = OverlapIntegral::default();
         let is_far = microscope.defocus_um(depth_um, stage_um).abs() > FAR_UM;
         let mut row = |direction: [f64; 2], samples: usize| {
             let mut mean = vec![[0.0; 2]; samples];
             for (pupil, weight) in &pupils {
-                profile(&mut lens, pupil, direction, step, *weight, faint(pupil, is_far), &mut mean);
+                profile(&mut overlap, pupil, direction, step, *weight, negligible_from(pupil, is_far), &mut mean);
             }
-            // Nothing is blurred that has no detail, whatever the rounding of the quadrature.
+            // Frequency 0 is transferred fully, without rounding errors of the quadrature.
             mean[0] = [1.0, 0.0];
             mean
         };
@@ -71,17 +70,17 @@ impl Transfer {
             let row = row([1.0, 0.0], SAMPLES).into_iter();
             return Self { step, table: row.map(|[a, p]| [[a, 0.0], [p, 0.0]]).collect() };
         }
-        let rows: Vec<Vec<[f64; 2]>> = (0..DIRECTIONS).map(|k| row(direction(k), SIDED_SAMPLES)).collect();
+        let rows: Vec<Vec<[f64; 2]>> = (0..DIRECTIONS).map(|k| row(direction(k), ASYMMETRIC_SAMPLES)).collect();
         // H_A = (E(f) + E*(−f))/2, H_P = (E(f) − E*(−f))/2i
         let pair = |k: usize, i: usize| {
             let ([a, b], [c, d]) = (rows[k][i], rows[(k + DIRECTIONS / 2) % DIRECTIONS][i]);
             [[0.5 * (a + c), 0.5 * (b - d)], [0.5 * (b + d), 0.5 * (c - a)]]
         };
-        let table = (0..DIRECTIONS).flat_map(|k| (0..SIDED_SAMPLES).map(move |i| (k, i))).map(|(k, i)| pair(k, i));
+        let table = (0..DIRECTIONS).flat_map(|k| (0..ASYMMETRIC_SAMPLES).map(move |i| (k, i))).map(|(k, i)| pair(k, i));
         Self { step, table: table.collect() }
     }
 
-    /// The sum of several of one microscope, each times its weight.
+    /// Returns the weighted sum of transfer functions of one microscope.
     pub(crate) fn mixed(parts: &[(Arc<Self>, f64)]) -> Self {
         let mut table = vec![[[0.0; 2]; 2]; parts[0].0.table.len()];
         for (part, weight) in parts {
@@ -93,32 +92,32 @@ impl Transfer {
         Self { step: parts[0].0.step, table }
     }
 
-    /// Whether one row says all.
+    /// Returns whether the table has a single row.
     pub(crate) fn is_round(&self) -> bool {
         self.table.len() == SAMPLES
     }
 
-    /// The distance of a microscope's tables between their entries, cycles/µm.
+    /// Returns the frequency step of a microscope's tables, in cycles/µm.
     pub(crate) fn step_of(microscope: &Microscope) -> f64 {
-        let samples = if microscope.params().zernike.is_round() { SAMPLES } else { SIDED_SAMPLES };
+        let samples = if microscope.params().zernike.is_round() { SAMPLES } else { ASYMMETRIC_SAMPLES };
         microscope.cutoff() / (samples - 1) as f64
     }
 
-    /// H_A at a frequency in cycles/µm: real and imaginary part. 1 at frequency 0, and 0 beyond
-    /// the cutoff.
+    /// Returns H_A at a frequency in cycles/µm, as real and imaginary part. It is 1 at frequency 0, and 0 beyond the
+    /// cutoff.
     #[must_use]
     pub fn absorption(&self, frequency: [f64; 2]) -> [f64; 2] {
         self.at(frequency)[0]
     }
 
-    /// H_P at a frequency in cycles/µm: real and imaginary part. 0 at frequency 0, and beyond
-    /// the cutoff.
+    /// Returns H_P at a frequency in cycles/µm, as real and imaginary part. It is 0 at frequency 0, and 0 beyond the
+    /// cutoff.
     #[must_use]
     pub fn phase(&self, frequency: [f64; 2]) -> [f64; 2] {
         self.at(frequency)[1]
     }
 
-    /// H_A and H_P.
+    /// Returns H_A and H_P.
     fn at(&self, [x, y]: [f64; 2]) -> [[f64; 2]; 2] {
         let table = &self.table;
         if self.is_round() {
@@ -140,67 +139,71 @@ impl Transfer {
         mixed
     }
 
-    /// The frequency beyond which neither H_A nor H_P exceeds `size`, cycles/µm.
+    /// Returns the frequency in cycles/µm beyond which neither H_A nor H_P exceeds `size`.
     pub(crate) fn extent(&self, size: f64) -> f64 {
         let large = |pair: &[f64; 2]| pair[0] * pair[0] + pair[1] * pair[1] > size * size;
         let last = if self.is_round() {
             self.table.iter().rposition(|[a, p]| large(&[a[0], p[0]]))
         } else {
-            let rows = self.table.chunks_exact(SIDED_SAMPLES);
+            let rows = self.table.chunks_exact(ASYMMETRIC_SAMPLES);
             rows.filter_map(|row| row.iter().rposition(|pairs| pairs.iter().any(large))).max()
         };
         last.map_or(0.0, |i| self.step * (i + 1) as f64)
     }
 }
 
-/// Nodes of a polynomial for a part of a profile: so many, and so many more for each fringe.
+/// Polynomial nodes of a section of a profile: a minimum, and the number per fringe.
 const NODES: (usize, f64) = (14, 3.5);
 
-/// Defocus from which on what is faint is left out, µm of mountant.
+/// Defocus in µm of mountant from which negligible transfer is omitted.
 const FAR_UM: f64 = 15.0;
-/// The transfer function of far defocus swings about 0 ever more faintly with q = 2π f r, r the radius of the condenser's
-/// cone: from here on it stays below 0.01 and is left out. No object has enough detail there to show it, and its fringes
-/// would take most of the time.
-const FAINT: f64 = 66.0;
-/// From this part of that frequency on it fades out.
+/// Transfer functions at large defocus oscillate around 0 with decreasing amplitude in q = 2π f r, r the radius of the
+/// condenser's cone. From this q on they stay below 0.01 and are omitted: no object has enough detail there, and their
+/// fringes would dominate the computing time.
+const NEGLIGIBLE_Q: f64 = 66.0;
+/// Start of the fade-out, as a fraction of that frequency.
 const FADES_FROM: f64 = 0.8;
 
-/// The frequency from which on nothing is transferred for being faint, cycles/µm.
-fn faint(pupil: &Pupil, is_far: bool) -> f64 {
-    if is_far { FAINT / (TAU * pupil.cone_radius()).max(f64::MIN_POSITIVE) } else { f64::INFINITY }
+/// Returns the frequency in cycles/µm from which on negligible transfer is omitted.
+fn negligible_from(pupil: &Pupil, is_far: bool) -> f64 {
+    if is_far { NEGLIGIBLE_Q / (TAU * pupil.cone_radius()).max(f64::MIN_POSITIVE) } else { f64::INFINITY }
 }
 
-/// Adds E at multiples of `step`, times a weight, to `sum`, up to the frequency `faint`.
+/// Adds E at multiples of `step`, times a weight, to `sum`, up to the frequency `negligible_from`.
 ///
-/// Between frequency 0, where the condenser's disc begins to leave the objective's, and the cutoff, E is smooth: a
-/// polynomial through few of its values gives all others.
+/// E is smooth between three points: frequency 0, the frequency where the condenser's disc begins to leave the
+/// objective's, and the cutoff. A polynomial through few values of each section gives all others.
 fn profile(
-    lens: &mut Lens,
+    overlap: &mut OverlapIntegral,
     pupil: &Pupil,
     direction: [f64; 2],
     step: f64,
     weight: f64,
-    faint: f64,
+    negligible_from: f64,
     sum: &mut [[f64; 2]],
 ) {
     let bend = pupil.objective - pupil.condenser;
     let steepest = pupil.steepest(pupil.objective);
     let cutoff = pupil.cutoff();
     let faded = |f: f64| {
-        if faint < cutoff { weight * fade((f / faint - FADES_FROM) / (1.0 - FADES_FROM)) } else { weight }
+        if negligible_from < cutoff {
+            weight * fade((f / negligible_from - FADES_FROM) / (1.0 - FADES_FROM))
+        } else {
+            weight
+        }
     };
     let (mut next, mut values) = (0, Vec::new());
-    for [from, to] in [[0.0, bend.min(faint)], [bend, cutoff.min(faint)]] {
+    for [from, to] in [[0.0, bend.min(negligible_from)], [bend, cutoff.min(negligible_from)]] {
         if to < from {
             break;
         }
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "places in the table")]
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "indices of the table")]
         let (end, nodes) = (
             ((to / step) as usize + 1).min(sum.len()),
             NODES.0 + (NODES.1 * steepest * (to - from)).min(sum.len() as f64) as usize,
         );
         values.clear();
-        let mut integral = |f| lens.integral(pupil, f, direction);
+        let mut integral = |f| overlap.integral(pupil, f, direction);
         if end <= next + nodes {
             values.extend((next..end).map(|i| integral(step * i as f64)));
         } else {
@@ -215,8 +218,8 @@ fn profile(
     }
 }
 
-/// A pair of smooth functions on an interval at Chebyshev's points, the ends among them: place, weight of the barycentric
-/// formula, values.
+/// Samples a pair of smooth functions at Chebyshev points of an interval, including its ends: position, weight of the
+/// barycentric formula, values.
 fn chebyshev([from, to]: [f64; 2], nodes: usize, mut function: impl FnMut(f64) -> [f64; 2]) -> Vec<[f64; 4]> {
     let last = nodes - 1;
     let node = |i: usize| {
@@ -228,11 +231,11 @@ fn chebyshev([from, to]: [f64; 2], nodes: usize, mut function: impl FnMut(f64) -
     (0..=last).map(node).collect()
 }
 
-/// Places that are looked up side by side.
+/// Positions evaluated in parallel.
 const LANES: usize = 8;
 
-/// The polynomials through such points at `step` times `first`, `first` + 1, …: Berrut and Trefethen, DOI
-/// 10.1137/S0036144502417715, Eq. 4.2.
+/// Evaluates the polynomials through Chebyshev points at `step` times `first`, `first` + 1, …: Berrut and Trefethen,
+/// DOI 10.1137/S0036144502417715, Eq. 4.2.
 #[multiversion(targets = "simd")]
 fn interpolate(nodes: &[[f64; 4]], step: f64, first: usize, out: &mut [[f64; 2]]) {
     for (block, out) in out.chunks_mut(LANES).enumerate() {
@@ -241,23 +244,23 @@ fn interpolate(nodes: &[[f64; 4]], step: f64, first: usize, out: &mut [[f64; 2]]
             *x = step * (first + LANES * block + lane) as f64;
         }
         let mut sums = [[0.0; LANES]; 3];
-        // The formula has no value at a node.
-        let mut met = [[0.0; LANES]; 3];
+        // The formula is singular at a node.
+        let mut at_node = [[0.0; LANES]; 3];
         for &[node, weight, a, b] in nodes {
             for l in 0..LANES {
                 let away = x[l] - node;
-                let (is_node, share) = (away == 0.0, weight / away);
-                sums[0][l] += share;
-                sums[1][l] += share * a;
-                sums[2][l] += share * b;
-                met[0][l] = if is_node { 1.0 } else { met[0][l] };
-                met[1][l] = if is_node { a } else { met[1][l] };
-                met[2][l] = if is_node { b } else { met[2][l] };
+                let (is_node, quotient) = (away == 0.0, weight / away);
+                sums[0][l] += quotient;
+                sums[1][l] += quotient * a;
+                sums[2][l] += quotient * b;
+                at_node[0][l] = if is_node { 1.0 } else { at_node[0][l] };
+                at_node[1][l] = if is_node { a } else { at_node[1][l] };
+                at_node[2][l] = if is_node { b } else { at_node[2][l] };
             }
         }
         for (l, out) in out.iter_mut().enumerate() {
-            *out = if met[0][l] > 0.0 {
-                [met[1][l], met[2][l]]
+            *out = if at_node[0][l] > 0.0 {
+                [at_node[1][l], at_node[2][l]]
             } else {
                 [sums[1][l] / sums[0][l], sums[2][l] / sums[0][l]]
             };
@@ -265,7 +268,7 @@ fn interpolate(nodes: &[[f64; 4]], step: f64, first: usize, out: &mut [[f64; 2]]
     }
 }
 
-/// Rows of a table lie at equal steps of y/(|x| + |y|), which runs around the circle as the angle does, without its
+/// Returns the direction of a table row. Rows are equidistant in y/(|x| + |y|), a substitute for the angle without its
 /// arctangent.
 fn direction(row: usize) -> [f64; 2] {
     let quarter = DIRECTIONS / 4;
@@ -280,11 +283,11 @@ fn direction(row: usize) -> [f64; 2] {
     }
 }
 
-/// The entries around a frequency, in steps of the table, and their weights; none beyond the last.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "places in the table")]
+/// Returns the table entries around a frequency, in table steps, and their weights, or `None` beyond the last entry.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "indices of the table")]
 pub(crate) fn corners([x, y]: [f64; 2]) -> Option<[(usize, f64); 4]> {
     let position = (x * x + y * y).sqrt();
-    if position >= (SIDED_SAMPLES - 1) as f64 {
+    if position >= (ASYMMETRIC_SAMPLES - 1) as f64 {
         return None;
     }
     let around = (y / (x.abs() + y.abs()).max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0);
@@ -296,7 +299,7 @@ pub(crate) fn corners([x, y]: [f64; 2]) -> Option<[(usize, f64); 4]> {
     let turn = quarters * (DIRECTIONS / 4) as f64;
     let (i, k) = (position as usize, turn as usize);
     let (t, u) = (position - i as f64, turn - k as f64);
-    let place = |k: usize, i: usize| (k % DIRECTIONS) * SIDED_SAMPLES + i;
+    let place = |k: usize, i: usize| (k % DIRECTIONS) * ASYMMETRIC_SAMPLES + i;
     Some([
         (place(k, i), (1.0 - u) * (1.0 - t)),
         (place(k, i + 1), (1.0 - u) * t),
@@ -305,7 +308,7 @@ pub(crate) fn corners([x, y]: [f64; 2]) -> Option<[(usize, f64); 4]> {
     ])
 }
 
-/// From 1 where t is 0 to 0 where it is 1.
+/// Falls smoothly from 1 at t = 0 to 0 at t = 1.
 pub(crate) fn fade(t: f64) -> f64 {
     let t = t.clamp(0.0, 1.0);
     1.0 - t * t * (3.0 - 2.0 * t)
@@ -317,9 +320,9 @@ mod tests {
     use crate::{MicroscopeParams, Zernike};
 
     #[test]
-    fn profiles_are_the_integrals() {
-        let mut lens = Lens::default();
-        // NA of the condenser, depth, stage, cover glass.
+    fn interpolated_profiles_match_the_integrals() {
+        let mut overlap = OverlapIntegral::default();
+        // Condenser NA, depth, stage position, excess cover glass thickness.
         let cases = [
             (0.95, 0.0, 0.0, 0.0),
             (0.9, 10.0, 0.0, 0.0),
@@ -338,15 +341,15 @@ mod tests {
                 let pupil = Pupil::new(&params, 0.57, depth, stage);
                 let step = pupil.cutoff() / (SAMPLES - 1) as f64;
                 let mut list = vec![[0.0; 2]; SAMPLES];
-                profile(&mut lens, &pupil, [0.6, 0.8], step, 1.0, faint(&pupil, true), &mut list);
+                profile(&mut overlap, &pupil, [0.6, 0.8], step, 1.0, negligible_from(&pupil, true), &mut list);
                 for (i, [a, b]) in list.into_iter().enumerate() {
-                    let [c, d] = lens.integral(&pupil, step * i as f64, [0.6, 0.8]);
+                    let [c, d] = overlap.integral(&pupil, step * i as f64, [0.6, 0.8]);
                     let error = (a - c).abs().max((b - d).abs());
                     let q = TAU * step * i as f64 * pupil.cone_radius();
-                    if q < FADES_FROM * FAINT {
+                    if q < FADES_FROM * NEGLIGIBLE_Q {
                         worst = worst.max(error);
                     } else {
-                        assert!(error < 0.01, "what is left out is faint: {error}");
+                        assert!(error < 0.01, "the omitted part is too large: {error}");
                     }
                 }
             }

@@ -1,4 +1,4 @@
-//! All that was measured on one microscope, and what is known of it before.
+//! The results of all measurements of a microscope.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,16 +7,16 @@ use crate::edge::Edge;
 use crate::focus::Focus;
 use crate::instrument::Instrument;
 
-/// All that was measured on one microscope, as `papsynth calibrate` keeps it in `calibration.json`.
+/// The results of all measurements of a microscope: the content of `calibration.json` of `papsynth calibrate`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration {
-    /// Version of the format; the first field, so that the file tells what it is.
+    /// Version of the format. As the first field, it also identifies the file.
     pub calibration: u32,
-    /// What was said of the microscope, where lengths are known.
+    /// Given parameters of the microscope, if lengths are known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub microscope: Option<Instrument>,
-    /// Blur against focus offset.
+    /// Blur versus defocus.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub focus: Option<Focus>,
     /// Blur in focus.
@@ -34,27 +34,27 @@ impl Default for Calibration {
 }
 
 impl Calibration {
-    /// Version of the format that this crate writes and reads.
+    /// Version of the format of this crate.
     pub const VERSION: u32 = 1;
 
     /// The first bytes of [`to_json`](Self::to_json).
-    pub const BEGINS: &[u8] = b"{\n  \"calibration\":";
+    pub const PREFIX: &[u8] = b"{\n  \"calibration\":";
 
-    /// Adds what another calibration of the same microscope has and this one has not.
-    pub fn keep(&mut self, older: Self) {
+    /// Adds the results of an older calibration that this one lacks.
+    pub fn merge_older(&mut self, older: Self) {
         self.microscope = self.microscope.take().or(older.microscope);
         self.focus = self.focus.take().or(older.focus);
         self.edge = self.edge.take().or(older.edge);
         self.camera = self.camera.take().or(older.camera);
     }
 
-    /// The calibration as JSON, with a line end after it.
+    /// Returns the calibration as JSON with a final line break.
     ///
     /// # Panics
-    /// Never: every field is a number, a text or a list of these.
+    /// Never: all fields serialize to JSON.
     #[must_use]
     pub fn to_json(&self) -> String {
-        let mut text = serde_json::to_string_pretty(self).expect("numbers, texts and lists can be written as JSON");
+        let mut text = serde_json::to_string_pretty(self).expect("numbers, strings and lists serialize to JSON");
         text.push('\n');
         text
     }

@@ -1,47 +1,47 @@
 //! Gain, noise and non-uniformity of a camera, by photon transfer.
 
 use ccd_noise::Error as Noise;
-use ccd_noise::calibrate::{self, Calibration, CalibrationParams, Light, PhotonTransfer, Shading};
+use ccd_noise::calibrate::{self, Calibration, CalibrationParams, LightLevel, PhotonTransfer, Shading};
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 
-/// Side of the square whose mean is taken for shading, px; frames must be larger.
+/// Size of the averaging window of the shading correction, px; frames must be larger.
 const SHADING_PX: usize = 15;
 
-/// How much lighter than the dark the brightest flat must be, as a part of all grey levels: below it, noise of the
-/// measurement would pass for a gain.
-const LEAST_LIGHT: f64 = 0.01;
+/// Smallest difference between the brightest flat and the dark level, as a fraction of full scale. Below it, noise
+/// dominates the measured gain.
+const MIN_LIGHT: f64 = 0.01;
 
-/// The camera.
+/// The measured camera.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Camera {
-    /// Bits of the converter.
+    /// Bits of a grey level.
     pub bits: u32,
     /// Grey levels per electron.
     pub gain_dn_per_e: f64,
-    /// Electrons that the largest grey level stands for.
+    /// Electrons of the largest grey level.
     pub full_scale_e: f64,
-    /// Mean in the dark, grey levels.
+    /// Mean dark level, grey levels.
     pub offset_dn: f64,
-    /// Noise in the dark, electrons.
+    /// Temporal dark noise, electrons.
     pub dark_noise_e: f64,
-    /// Spread of the pixels' offsets, electrons.
+    /// Dark signal non-uniformity (standard deviation), electrons.
     pub dsnu_e: f64,
-    /// Spread of the pixels' responses, as a part.
+    /// Photo response non-uniformity (relative standard deviation).
     pub prnu: f64,
-    /// Where the camera saturates.
+    /// Saturation.
     pub saturation: Saturation,
-    /// From dark to bright.
+    /// Light levels, from dark to bright.
     pub levels: Vec<Level>,
 }
 
-/// Where the variance is largest, or the brightest level where it still rises.
+/// The level of largest variance, or the brightest level if the variance still increases.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Saturation {
-    /// Whether the flats reach it.
+    /// Whether the flats reach saturation.
     pub reached: bool,
     /// Grey levels above the dark.
     pub dn: f64,
@@ -49,23 +49,23 @@ pub struct Saturation {
     pub e: f64,
 }
 
-/// Frames of one light.
+/// Statistics of the frames of one light level.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Level {
-    /// The name that it was given.
+    /// Name of the light level.
     pub name: String,
-    /// Whether it was taken in the dark.
+    /// Whether the frames are dark frames.
     pub dark: bool,
     /// Number of frames.
     pub frames: usize,
     /// Mean, grey levels.
     pub mean_dn: f64,
-    /// Variance from frame to frame, squared grey levels.
+    /// Temporal variance, squared grey levels.
     pub variance_dn2: f64,
-    /// Variance from pixel to pixel, squared grey levels.
+    /// Spatial variance, squared grey levels.
     pub spatial_dn2: f64,
-    /// The share of pixels at the highest level.
+    /// Fraction of pixels at the highest level.
     pub at_highest: f64,
 }
 
@@ -73,7 +73,7 @@ impl Level {
     fn new(name: &str, level: &calibrate::Level) -> Self {
         Self {
             name: name.to_owned(),
-            dark: level.light == Light::Dark,
+            dark: level.light == LightLevel::Dark,
             frames: level.frames,
             mean_dn: level.mean_dn,
             variance_dn2: level.variance_dn2,
@@ -83,18 +83,18 @@ impl Level {
     }
 }
 
-/// A frame of an even field, or of the dark.
+/// A flat-field or dark frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Frame<'a> {
-    /// What errors call it.
+    /// Name in errors.
     pub name: &'a str,
-    /// Grey levels, row after row.
+    /// Grey levels, row by row.
     pub grey: &'a [u16],
     /// Columns.
     pub width: usize,
 }
 
-/// Flat frames, added a level of light at a time, so that not all lie in memory.
+/// A photon-transfer measurement. Frames of one light level at a time are in memory.
 #[derive(Debug)]
 pub struct Flats {
     transfer: PhotonTransfer,
@@ -104,7 +104,7 @@ pub struct Flats {
 }
 
 impl Flats {
-    /// No frames yet, of a camera of `bits` bits, 8 to 16.
+    /// Starts a measurement of a camera with `bits` bits, 8 to 16.
     ///
     /// # Errors
     /// If the bits are out of range.
@@ -115,11 +115,11 @@ impl Flats {
         Ok(Self { transfer, bits, size: None, levels: Vec::new() })
     }
 
-    /// Adds the frames of one light, two or more, all of one size.
+    /// Adds two or more frames of one light level.
     ///
     /// # Errors
-    /// If frames differ in size or are too small, hold grey levels beyond the bits, or cannot be measured.
-    pub fn add(&mut self, name: &str, frames: &[Frame<'_>], light: Light) -> Result<(), Error> {
+    /// If frames differ in size, are too small, have grey levels beyond the bits, or cannot be measured.
+    pub fn add(&mut self, name: &str, frames: &[Frame<'_>], light: LightLevel) -> Result<(), Error> {
         for frame in frames {
             let found = [frame.width, frame.grey.len() / frame.width.max(1)];
             let expected = *self.size.get_or_insert(found);
@@ -141,14 +141,14 @@ impl Flats {
         Ok(())
     }
 
-    /// The camera that the frames show.
+    /// Returns the measured camera.
     ///
     /// # Errors
-    /// If no level is dark, or the others are saturated, alike or too dark.
+    /// If no level is dark, or the others are saturated, equal or too dark.
     pub fn camera(mut self) -> Result<Camera, Error> {
         let found = self.transfer.calibration().map_err(Error::Camera)?;
         let highest = f64::from(u16::MAX >> (u16::BITS - self.bits));
-        let expected = LEAST_LIGHT * (highest - found.offset_dn).max(0.0);
+        let expected = MIN_LIGHT * (highest - found.offset_dn).max(0.0);
         let brightest = self.levels.iter().map(|level| level.mean_dn - found.offset_dn).fold(0.0, f64::max);
         if brightest < expected {
             return Err(Error::TooDark { found: brightest, expected });
@@ -157,7 +157,7 @@ impl Flats {
         let Calibration { gain_dn_per_e, offset_dn, dark_noise_e, dsnu_e, prnu, .. } = found;
         let saturation = match found.saturation {
             calibrate::Saturation::Reached { dn, e } => Saturation { reached: true, dn, e },
-            calibrate::Saturation::Above { dn, e } => Saturation { reached: false, dn, e },
+            calibrate::Saturation::NotReached { dn, e } => Saturation { reached: false, dn, e },
         };
         Ok(Camera {
             bits: self.bits,

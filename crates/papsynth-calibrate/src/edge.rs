@@ -1,4 +1,4 @@
-//! σ in the plane of the image, from a straight edge in focus, and blur beyond that of the lens.
+//! σ in focus from a straight edge, and blur in addition to that of the objective.
 
 use std::f64::consts::{PI, SQRT_2};
 
@@ -9,67 +9,67 @@ use serde::{Deserialize, Serialize};
 use crate::error::Error;
 use crate::find;
 
-/// Least side of a window.
-const LEAST_SIDE_PX: f64 = 8.0;
+/// Smallest size of a window, px.
+const MIN_SIDE_PX: f64 = 8.0;
 
-/// Where a straight edge lies.
+/// The position of a straight edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum EdgeAt {
-    /// The sharpest straight edge of the image is found.
-    Found,
-    /// In the square around the middle of the line between two points whose side is as long as the line, pixels.
+    /// Automatic detection of the sharpest straight edge.
+    Detected,
+    /// The square around the centre of a line (x0, y0, x1, y1), px. Its size is the length of the line.
     Line([f64; 4]),
 }
 
-/// An edge.
+/// A measured edge.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Edge {
-    /// Left, top, width, height, pixels.
+    /// Left, top, width and height of the window, px.
     pub window: [usize; 4],
-    /// σ of the blur, with the width of the pixel in it, pixels.
+    /// σ of the blur, including the pixel width, px.
     pub sigma_px: f64,
-    /// Its standard error.
+    /// Standard error of σ, px.
     pub error_px: f64,
     /// Grey level of the dark side.
     pub dark: f64,
     /// Grey level of the light side.
     pub light: f64,
-    /// Towards the light, x right and y down.
+    /// Unit vector towards the light side; x right, y down.
     pub normal: [f64; 2],
-    /// Root mean square of what the fit leaves.
+    /// Root mean square of the residuals.
     pub difference: f64,
 }
 
 impl Edge {
-    /// Measures an edge in an image of rows of `width` pixels, grey levels of any unit.
+    /// Measures an edge in an image with rows of `width` pixels, grey levels in any unit.
     ///
     /// # Errors
     /// If there is no straight edge, or it cannot be fitted.
     ///
     /// # Panics
-    /// If the image is not whole rows.
+    /// If the image is not complete rows.
     pub fn measure(image: &[f32], width: usize, at: EdgeAt) -> Result<Self, Error> {
         let (window, fit) = match at {
-            EdgeAt::Found => find::straight_edge(image, width).ok_or(Error::NoEdge)?,
+            EdgeAt::Detected => find::straight_edge(image, width).ok_or(Error::NoEdge)?,
             EdgeAt::Line(line) => {
                 let height = image.len() / width;
                 let window = square_around(line, width, height).ok_or(Error::Line { line, width, height })?;
                 (window, calibrate::edge(image, width, window).map_err(Error::Edge)?)
             }
         };
-        let EdgeFit { sigma_px, dark, light, normal, difference } = fit;
-        // From the slopes of the least squares: ∫ t²φ² = 1 ∕ (4√π).
+        let EdgeFit { sigma_px, dark, light, normal, rms_residual: difference } = fit;
+        // From least squares: ∫ t²φ² = 1 ∕ (4√π).
         let length = window.width.min(window.height) as f64;
         let error_px = difference / (light - dark) * (4.0 * PI.sqrt() * sigma_px / length).sqrt();
         Ok(Self { window: find::numbers(window), sigma_px, error_px, dark, light, normal, difference })
     }
 
-    /// Distance of each pixel of the window from the middle of the edge, towards the light, and its grey level. The
-    /// middle is where the fit leaves least.
+    /// Returns the distance of each pixel of the window from the edge, positive on the light side, and its grey level.
+    /// The position of the edge minimizes the residuals.
     ///
     /// # Panics
-    /// If the window does not lie in the image.
+    /// If the window extends beyond the image.
     #[must_use]
     pub fn profile(&self, image: &[f32], width: usize) -> Vec<[f64; 2]> {
         let [left, top, wide, high] = self.window;
@@ -87,52 +87,49 @@ impl Edge {
             let shifts = (0..=count).map(|i| from + step * f64::from(i));
             shifts.min_by(|a, b| rest(*a).total_cmp(&rest(*b))).unwrap_or(from)
         };
-        // To a quarter of a pixel, then to a hundredth.
+        // Search in steps of 0.25 px, then 0.01 px.
         let reach = cx + cy;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "four times a window's side")]
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "four times the size of a window")]
         let coarse = best(-reach, 0.25, (8.0 * reach) as u32);
         let shift = best(coarse - 0.25, 0.01, 50);
         samples.into_iter().map(|[d, value]| [d - shift, value]).collect()
     }
 
-    /// Grey level of the fitted edge at a distance from its middle, pixels.
+    /// Returns the grey level of the fitted edge at a distance from its centre, px.
     #[must_use]
     pub fn at(&self, distance_px: f64) -> f64 {
         self.dark + (self.light - self.dark) * 0.5 * libm::erfc(-distance_px / (self.sigma_px * SQRT_2))
     }
 }
 
-/// The square around a line's middle whose side is as long as the line.
+/// Returns the square around the centre of a line, with the size of its length.
 fn square_around([x0, y0, x1, y1]: [f64; 4], width: usize, height: usize) -> Option<Window> {
     let (dx, dy) = (x1 - x0, y1 - y0);
     let side = (dx * dx + dy * dy).sqrt().round();
     let first = |a: f64, b: f64| (0.5 * (a + b) - 0.5 * (side - 1.0)).round();
     let (left, top) = (first(x0, x1), first(y0, y1));
-    let inside = side >= LEAST_SIDE_PX
-        && left >= 0.0
-        && top >= 0.0
-        && left + side <= width as f64
-        && top + side <= height as f64;
+    let inside =
+        side >= MIN_SIDE_PX && left >= 0.0 && top >= 0.0 && left + side <= width as f64 && top + side <= height as f64;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the image")]
     inside.then_some(Window { left: left as usize, top: top as usize, width: side as usize, height: side as usize })
 }
 
-/// Compares an edge with a sharp one of the same contrast and direction, drawn by this microscope: σ that the sharp edge has, and σ of
-/// the further spread that makes it as wide as the edge that was measured, 0 if it is as wide already. Pixels.
-pub(crate) fn beyond(edge: &Edge, microscope: &MicroscopeParams) -> Result<[f64; 2], optics_psf::Error> {
-    /// Pixels of the image, and the window in its middle.
+/// Simulates a sharp edge of the same contrast and direction with this microscope. Returns σ of its image, and σ of the
+/// additional Gaussian blur that makes it as wide as the measured edge, or 0 if it is not narrower; px.
+pub(crate) fn extra_blur(edge: &Edge, microscope: &MicroscopeParams) -> Result<[f64; 2], optics_psf::Error> {
+    /// Sizes of the image and of the central window, px.
     const SIDE: usize = 96;
     const WINDOW: usize = 24;
-    /// Halvings after which the spread is known to a thousandth of a pixel.
-    const HALVINGS: u32 = 14;
+    /// Bisections for a precision of 0.001 px.
+    const BISECTIONS: u32 = 14;
     let image = sharp_edge(edge, microscope, SIDE)?;
     let first = (SIDE - WINDOW) / 2;
     let window = Window { left: first, top: first, width: WINDOW, height: WINDOW };
     let expected_px = calibrate::edge(&image, SIDE, window)?.sigma_px;
-    // The edge of a lens is no Gaussian's, so that squares of widths do not simply add.
+    // The blur of the objective is not Gaussian: variances do not add exactly.
     let (mut low, mut high) = (0.0, edge.sigma_px);
     let (mut blurred, mut scratch) = (image.clone(), Scratch::new());
-    for _ in 0..HALVINGS {
+    for _ in 0..BISECTIONS {
         let extra = 0.5 * (low + high);
         Gaussian::new(extra)?.blur_into(&image, SIDE, Border::Replicate, &mut blurred, &mut scratch);
         if calibrate::edge(&blurred, SIDE, window)?.sigma_px < edge.sigma_px { low = extra } else { high = extra }
@@ -141,11 +138,11 @@ pub(crate) fn beyond(edge: &Edge, microscope: &MicroscopeParams) -> Result<[f64;
     Ok([expected_px, extra_px])
 }
 
-/// The image of a sharp edge through the middle of a square of `side` pixels.
+/// Returns the image of a sharp edge through the centre of a square of `side` pixels.
 fn sharp_edge(edge: &Edge, microscope: &MicroscopeParams, side: usize) -> Result<Vec<f32>, optics_psf::Error> {
-    /// σ of the edge itself, pixels: far below what pixels show, but no staircase.
+    /// σ of the edge itself, px: much smaller than a pixel, but without aliasing.
     const OWN_PX: f64 = 0.12;
-    /// Absorbance of the edge, which matters little: a trace, and where hardly any light is left.
+    /// Range of the absorbance of the edge; it has little effect.
     const ABSORBANCE: [f64; 2] = [0.02, 1.0];
     let step = if edge.dark > 0.0 { libm::log10(edge.light / edge.dark) } else { ABSORBANCE[1] };
     let absorbance = step.clamp(ABSORBANCE[0], ABSORBANCE[1]);
@@ -177,9 +174,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_asks_for_the_square_around_its_middle() {
+    fn a_line_selects_the_square_around_its_centre() {
         let square = |line| square_around(line, 64, 48).map(find::numbers);
-        // Across or along.
+        // Horizontal and vertical.
         assert_eq!(square([10.0, 20.0, 26.0, 20.0]), Some([11, 13, 16, 16]));
         assert_eq!(square([18.0, 12.0, 18.0, 28.0]), Some([11, 13, 16, 16]));
         assert_eq!(square([0.0, 0.0, 47.0, 47.0]), None);

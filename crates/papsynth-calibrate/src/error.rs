@@ -1,19 +1,19 @@
-//! What can go wrong.
+//! Errors.
 
 use optics_psf::calibrate::Window;
 
-/// Why something cannot be measured.
+/// An error of a measurement.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A stack has too few planes.
-    #[error("{planes} planes; expected 3 or more")]
+    #[error("planes: found {planes}, expected 3 or more")]
     Planes {
-        /// Planes of the stack.
+        /// Number of planes.
         planes: usize,
     },
-    /// Nothing in the stack looks like a nucleus.
-    #[error("no dark, compact thing was found in it")]
+    /// The stack contains no nucleus.
+    #[error("no nucleus found: expected a dark, compact object")]
     NoNucleus,
     /// A nucleus cannot be measured.
     #[error("window {},{},{},{}: {source}", window.left, window.top, window.width, window.height)]
@@ -23,14 +23,14 @@ pub enum Error {
         /// The reason.
         source: optics_psf::Error,
     },
-    /// The aperture of the condenser cannot be found.
+    /// The aperture of the condenser cannot be estimated.
     #[error("the condenser's aperture: {0}")]
     Condenser(optics_psf::Error),
-    /// The microscope is impossible, or is outside the range that the optics compute.
+    /// A parameter of the microscope is out of range.
     #[error("the microscope: {0}")]
     Microscope(optics_psf::Error),
-    /// The square around a line is too small, or lies outside the image.
-    #[error("line {},{},{},{}: its square does not lie in the {width} x {height} image", line[0], line[1], line[2], line[3])]
+    /// The square around a line is too small, or extends beyond the image.
+    #[error("line {},{},{},{}: its square extends beyond the {width} x {height} image, or is smaller than 8 px", line[0], line[1], line[2], line[3])]
     Line {
         /// The two ends of the line, pixels.
         line: [f64; 4],
@@ -39,14 +39,14 @@ pub enum Error {
         /// Rows of the image.
         height: usize,
     },
-    /// No window of the image holds a straight edge.
-    #[error("no straight edge was found in it")]
+    /// The image contains no straight edge.
+    #[error("no straight edge found")]
     NoEdge,
     /// An edge cannot be fitted.
     #[error(transparent)]
     Edge(optics_psf::Error),
     /// Frames differ in size.
-    #[error("{name}: {} x {} pixels, others {} x {}", found[0], found[1], expected[0], expected[1])]
+    #[error("{name}: found {} x {} pixels, expected {} x {} as in the other frames", found[0], found[1], expected[0], expected[1])]
     Sizes {
         /// The frame.
         name: String,
@@ -55,25 +55,25 @@ pub enum Error {
         /// Columns and rows of the frames before it.
         expected: [usize; 2],
     },
-    /// A frame is not larger than the square whose mean is taken for shading.
-    #[error("{name}: {} x {} pixels; expected more than {least} pixels on each side", found[0], found[1])]
+    /// A frame is not larger than the window of the shading correction.
+    #[error("{name}: {} x {} pixels; expected more than {least} in each direction", found[0], found[1])]
     Small {
         /// The frame.
         name: String,
         /// Its columns and rows.
         found: [usize; 2],
-        /// Side of the square.
+        /// Size of the window.
         least: usize,
     },
-    /// A frame has a grey level that the camera cannot give.
-    #[error("{name} holds the grey level {value}")]
+    /// A grey level exceeds the bits of the camera.
+    #[error("{name}: the grey level {value} exceeds the bits of the camera")]
     Bits {
-        /// The level of light.
+        /// The light level.
         name: String,
         /// The grey level.
         value: f64,
     },
-    /// The frames of a level of light cannot be measured.
+    /// The frames of a light level cannot be measured.
     #[error("{name}: {source}")]
     Level {
         /// The level.
@@ -81,17 +81,17 @@ pub enum Error {
         /// The reason.
         source: ccd_noise::Error,
     },
-    /// The levels of light do not give the camera.
+    /// The light levels are insufficient for the camera.
     #[error(transparent)]
     Camera(ccd_noise::Error),
-    /// All levels of light are too dark: noise of the measurement would pass for a gain.
+    /// All light levels are too dark to measure the gain.
     #[error(
-        "the brightest level is {found:.1} grey levels above the dark; expected at least 1 % of all, {expected:.0}"
+        "the brightest light level is {found:.1} grey levels above the dark level; expected at least {expected:.0} (1 % of full scale)"
     )]
     TooDark {
-        /// Grey levels of the brightest above the dark.
+        /// Difference between the brightest level and the dark level, grey levels.
         found: f64,
-        /// The least that is accepted.
+        /// Smallest accepted difference, grey levels.
         expected: f64,
     },
 }

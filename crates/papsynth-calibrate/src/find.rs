@@ -1,4 +1,4 @@
-//! Where to measure: nuclei of a stack, and straight edges.
+//! Detection of nuclei and straight edges.
 
 use std::f64::consts::FRAC_PI_4;
 
@@ -7,41 +7,41 @@ use optics_psf::{Border, Gaussian, Scratch};
 use papsynth::truth::LabelMap;
 use papsynth_dataset::read::{Component, Limits, components};
 
-/// Most nuclei that are measured: the median of so many no longer changes.
-const MOST_NUCLEI: usize = 24;
+/// Largest number of measured nuclei; more do not change the median.
+const MAX_NUCLEI: usize = 24;
 
-/// Grey levels between the darkest and the background at which nuclei are looked for.
+/// Number of thresholds between the darkest level and the background.
 const LEVELS: u16 = 32;
 
-/// The noise of single pixels is smoothed away, px.
+/// σ of the smoothing against pixel noise, px.
 const SMOOTHING_PX: f64 = 1.0;
 
-/// Width and height of a nucleus in pixels, where nobody says how large a pixel is; never more than half of the image.
+/// Range of width and height of a nucleus for unknown pixel size, px; the upper limit is at most half of the image.
 const NUCLEUS_PX: [f64; 2] = [10.0, 120.0];
 
-/// The same in micrometres: from a small lymphocyte-like nucleus to a large dysplastic one.
+/// Range of width and height of a nucleus, µm: from small lymphocytes to large dysplastic cells.
 const NUCLEUS_UM: [f64; 2] = [4.0, 30.0];
 
-/// How much of the ellipse in its box a compact thing fills.
+/// Range of the area of compact objects, relative to the ellipse in the bounding box.
 const COMPACT: [f64; 2] = [0.8, 1.15];
 
-/// Longest of compact things, against its width.
-const LONGEST: f64 = 1.8;
+/// Largest aspect ratio of compact objects.
+const MAX_ASPECT: f64 = 1.8;
 
-/// Pixels of background around a nucleus that belong to its window: there its blurred border arrives.
+/// Margin of a window around a nucleus for its blurred border, px.
 const AROUND_PX: usize = 6;
 
-/// Side of the windows in which edges are looked for, and the distance between two.
+/// Size and spacing of the windows in the search for edges, px.
 const EDGE_SIDE_PX: usize = 24;
 const EDGE_STEP_PX: usize = 6;
 
-/// Windows that are fitted.
-const MOST_EDGES: usize = 60;
+/// Largest number of windows that are fitted.
+const MAX_EDGES: usize = 60;
 
-/// What a fit may leave, as a part of the step from dark to light, for an edge to count as straight and alone.
-const STRAIGHT: f64 = 0.06;
+/// Largest residual of the fit of a single straight edge, as a fraction of its contrast.
+const MAX_RESIDUAL: f64 = 0.06;
 
-/// Windows around dark, compact, sharp things, the sharpest first; `pixel_um` tells how large nuclei are.
+/// Returns windows around dark, compact, sharp objects, the sharpest first. `pixel_um` sets the range of sizes.
 pub(crate) fn nuclei(planes: &[&[f32]], width: usize, pixel_um: Option<f64>) -> Vec<Window> {
     let height = planes[0].len() / width;
     let image = smooth(&darkest(planes), width);
@@ -61,15 +61,15 @@ pub(crate) fn nuclei(planes: &[&[f32]], width: usize, pixel_um: Option<f64>) -> 
     }
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut windows: Vec<Window> = Vec::new();
-    for window in found.iter().filter_map(|(_, region)| around(region, width, height)) {
-        if windows.len() < MOST_NUCLEI && windows.iter().all(|w| !overlap(*w, window)) {
+    for window in found.iter().filter_map(|(_, region)| with_margin(region, width, height)) {
+        if windows.len() < MAX_NUCLEI && windows.iter().all(|w| !overlap(*w, window)) {
             windows.push(window);
         }
     }
     windows
 }
 
-/// The window of the sharpest straight edge, and its fit.
+/// Returns the window of the sharpest straight edge and its fit.
 pub(crate) fn straight_edge(image: &[f32], width: usize) -> Option<(Window, EdgeFit)> {
     let height = image.len() / width;
     let side = EDGE_SIDE_PX.min(width).min(height);
@@ -77,22 +77,22 @@ pub(crate) fn straight_edge(image: &[f32], width: usize) -> Option<(Window, Edge
         .step_by(EDGE_STEP_PX)
         .flat_map(|top| (0..=width - side).step_by(EDGE_STEP_PX).map(move |left| (left, top)))
         .map(|(left, top)| Window { left, top, width: side, height: side })
-        .map(|window| (one_direction(image, width, window), window))
+        .map(|window| (anisotropy(image, width, window), window))
         .collect();
     windows.sort_by(|a, b| b.0.total_cmp(&a.0));
     let fits =
-        windows.iter().take(MOST_EDGES).filter_map(|(_, window)| Some((*window, edge(image, width, *window).ok()?)));
-    let straight = fits.filter(|(_, fit)| fit.difference <= STRAIGHT * (fit.light - fit.dark));
+        windows.iter().take(MAX_EDGES).filter_map(|(_, window)| Some((*window, edge(image, width, *window).ok()?)));
+    let straight = fits.filter(|(_, fit)| fit.rms_residual <= MAX_RESIDUAL * (fit.light - fit.dark));
     let slope = |fit: &EdgeFit| (fit.light - fit.dark) / fit.sigma_px;
     straight.max_by(|a, b| slope(&a.1).total_cmp(&slope(&b.1)))
 }
 
-/// Left, top, width and height.
+/// Returns left, top, width and height.
 pub(crate) fn numbers(window: Window) -> [usize; 4] {
     [window.left, window.top, window.width, window.height]
 }
 
-/// The darkest that each pixel becomes: a nucleus is darkest in focus.
+/// Returns the minimum of each pixel over all planes: a nucleus is darkest in focus.
 fn darkest(planes: &[&[f32]]) -> Vec<f32> {
     let mut image = planes[0].to_vec();
     for plane in &planes[1..] {
@@ -111,7 +111,7 @@ fn smooth(image: &[f32], width: usize) -> Vec<f32> {
     out
 }
 
-/// Grey levels from the darkest to the median, which is background.
+/// Returns thresholds from the darkest level to the median, which is background.
 fn levels(image: &[f32]) -> impl Iterator<Item = f32> + use<> {
     let mut sorted = image.to_vec();
     sorted.sort_by(f32::total_cmp);
@@ -125,16 +125,16 @@ fn is_compact(region: &Component, [least, most]: [f64; 2]) -> bool {
     let filled = region.mask.area() as f64 / (FRAC_PI_4 * w * h);
     w.min(h) >= least
         && w.max(h) <= most
-        && w.max(h) <= LONGEST * w.min(h)
+        && w.max(h) <= MAX_ASPECT * w.min(h)
         && (COMPACT[0]..=COMPACT[1]).contains(&filled)
 }
 
-/// The mean slope of the image at a region's left and right ends: how dark it is, and how sharply it ends.
+/// Returns the mean gradient at the left and right ends of a region, a measure of contrast and sharpness.
 fn border_slope(region: &Component, image: &[f32], width: usize) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for run in region.mask.runs() {
         for x in [run.x0, run.x1 - 1] {
-            // No region touches the border.
+            // Regions do not touch the border of the image.
             let i = run.y as usize * width + x as usize;
             let slope = |back: usize, on: usize| 0.5 * f64::from(image[on] - image[back]);
             let (dx, dy) = (slope(i - 1, i + 1), slope(i - width, i + width));
@@ -145,8 +145,8 @@ fn border_slope(region: &Component, image: &[f32], width: usize) -> f64 {
     sum / count
 }
 
-/// A region's box and what is around it.
-fn around(region: &Component, width: usize, height: usize) -> Option<Window> {
+/// Returns the bounding box of a region with a margin.
+fn with_margin(region: &Component, width: usize, height: usize) -> Option<Window> {
     let bounds = region.mask.bounds()?;
     let side = |from: u32, len: u32, whole: usize| {
         let (from, to) = (from as usize, (from + len) as usize);
@@ -159,13 +159,12 @@ fn around(region: &Component, width: usize, height: usize) -> Option<Window> {
 }
 
 fn overlap(a: Window, b: Window) -> bool {
-    let meet = |a: usize, a_len: usize, b: usize, b_len: usize| a < b + b_len && b < a + a_len;
-    meet(a.left, a.width, b.left, b.width) && meet(a.top, a.height, b.top, b.height)
+    let intersect = |a: usize, a_len: usize, b: usize, b_len: usize| a < b + b_len && b < a + a_len;
+    intersect(a.left, a.width, b.left, b.width) && intersect(a.top, a.height, b.top, b.height)
 }
 
-/// How much more the image changes in one direction than across it: the difference of the two eigenvalues of the
-/// structure tensor.
-fn one_direction(image: &[f32], width: usize, window: Window) -> f64 {
+/// Returns the anisotropy of the gradient: the difference of the two eigenvalues of the structure tensor.
+fn anisotropy(image: &[f32], width: usize, window: Window) -> f64 {
     let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
     for y in window.top + 1..window.top + window.height - 1 {
         for x in window.left + 1..window.left + window.width - 1 {

@@ -1,11 +1,11 @@
-//! A microscope as its user knows it.
+//! The known parameters of a microscope.
 
 use optics_psf::{Microscope, MicroscopeParams};
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 
-/// A microscope as its user knows it.
+/// The known parameters of a microscope.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Instrument {
@@ -17,7 +17,7 @@ pub struct Instrument {
     pub mount_index: f64,
     /// Refractive index between cover glass and objective.
     pub immersion_index: f64,
-    /// Side of a pixel in the object, µm.
+    /// Size of a pixel in the object, µm.
     pub pixel_um: f64,
 }
 
@@ -30,7 +30,7 @@ impl Default for Instrument {
 }
 
 impl Instrument {
-    /// Checks that the optics can compute this microscope.
+    /// Checks the ranges of the parameters.
     ///
     /// # Errors
     /// [`Error::Microscope`] with the field that is out of range.
@@ -39,7 +39,7 @@ impl Instrument {
         Microscope::new(&self.params(condenser_na)).map(drop).map_err(Error::Microscope)
     }
 
-    /// The parameters of the optics, with this aperture of the condenser.
+    /// Returns the parameters of the optics for an aperture of the condenser.
     #[must_use]
     pub fn params(&self, condenser_na: f64) -> MicroscopeParams {
         let Self { na, wavelength_um, mount_index, immersion_index, pixel_um } = *self;

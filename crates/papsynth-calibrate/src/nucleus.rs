@@ -7,23 +7,23 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Nucleus {
-    /// Left, top, width, height, pixels.
+    /// Left, top, width and height, px.
     pub window: [usize; 4],
-    /// Its plane in focus, counted from 0.
+    /// Index of the plane in focus.
     pub focused: usize,
-    /// σ in each plane, pixels.
+    /// σ in each plane, px.
     pub sigma_px: Vec<f64>,
 }
 
 impl Nucleus {
-    /// σ in each plane, with the number of planes from focus.
+    /// Returns the number of planes from focus and σ of each plane.
     pub(crate) fn points(&self) -> impl Iterator<Item = (i64, f64)> {
         let focused = self.focused.cast_signed() as i64;
         self.sigma_px.iter().zip(0_i64..).map(move |(sigma, plane)| (plane - focused, *sigma))
     }
 }
 
-/// The standard error of a mean; of one number alone nothing is known, and it is 0.
+/// Returns the standard error of the mean, or 0 for fewer than 2 values.
 pub(crate) fn standard_error(values: &[f64]) -> f64 {
     if values.len() < 2 { 0.0 } else { deviation(values) / (values.len() as f64).sqrt() }
 }

@@ -1,4 +1,4 @@
-//! Sections of recipes that were measured, as `papsynth generate` reads them.
+//! Measured sections of recipes in TOML.
 
 use std::fmt::Write;
 
@@ -9,13 +9,13 @@ use toml::Value;
 use crate::calibration::Calibration;
 use crate::camera::Camera;
 use crate::condenser::Bound;
-use crate::edge::beyond;
+use crate::edge::extra_blur;
 use crate::error::Error;
 
-/// The first bytes of every text that [`Calibration`] writes for a recipe.
-pub const BEGINS: &[u8] = b"# Measured by papsynth calibrate";
+/// The first bytes of every section that [`Calibration`] writes.
+pub const PREFIX: &[u8] = b"# Measured by papsynth calibrate";
 
-/// One section of a recipe, each field with where it is from.
+/// A section of a recipe, with a note on the origin of each field.
 struct Section {
     name: &'static str,
     about: String,
@@ -28,7 +28,7 @@ impl Section {
     }
 
     fn to_toml(&self) -> String {
-        format!("{}: {}\n\n{}", String::from_utf8_lossy(BEGINS), self.about, self.table())
+        format!("{}: {}\n\n{}", String::from_utf8_lossy(PREFIX), self.about, self.table())
     }
 
     fn table(&self) -> String {
@@ -43,11 +43,11 @@ impl Section {
 }
 
 impl Calibration {
-    /// The sections `[optics]` and `[light]` of a bright-field microscope, in TOML; nothing if no length in micrometres is
-    /// known, or nothing was measured.
+    /// Returns the sections `[optics]` and `[light]` of a bright-field microscope in TOML; `None` if lengths in
+    /// micrometres are unknown, or neither condenser nor edge were measured.
     ///
     /// # Errors
-    /// If the optics cannot compute the microscope.
+    /// If a parameter of the microscope is out of range.
     pub fn bright_field_toml(&self) -> Result<Option<String>, Error> {
         let Some(instrument) = &self.microscope else { return Ok(None) };
         let condenser = self.focus.as_ref().and_then(|focus| focus.condenser.as_ref());
@@ -64,35 +64,34 @@ impl Calibration {
         };
         section.set("kind", "bright-field", "");
         section.set("na", instrument.na, "as given");
-        let note = condenser.map_or("not measured: the default; --stack with --step-um finds it".to_owned(), |c| {
+        let note = condenser.map_or("not measured: default; --stack with --step-um measures it".to_owned(), |c| {
             let limit = if c.bound == Bound::Inside { String::new() } else { format!("{}; ", c.bound.words()) };
             format!("measured: {limit}{:.3} +- {:.3}", c.na, c.error)
         });
         section.set("condenser_na", condenser_na, note);
         section.set("mount_index", instrument.mount_index, "as given");
         section.set("immersion_index", instrument.immersion_index, "as given");
-        section.set("cover_error_um", default.cover_error_um, "the default");
+        section.set("cover_error_um", default.cover_error_um, "default");
         let (extra, note) = match &self.edge {
-            None => (0.0, "not measured: --edge finds it".to_owned()),
+            None => (0.0, "not measured; --edge measures it".to_owned()),
             Some(found) => {
-                let [expected_px, extra_px] = beyond(found, &params).map_err(Error::Microscope)?;
+                let [expected_px, extra_px] = extra_blur(found, &params).map_err(Error::Microscope)?;
                 let sigma_px = found.sigma_px;
-                let note =
-                    format!("measured: an edge of {sigma_px:.3} px, where the lens alone makes {expected_px:.3} px");
+                let note = format!("measured: edge blur {sigma_px:.3} px, of the objective alone {expected_px:.3} px");
                 (extra_px * instrument.pixel_um, note)
             }
         };
         section.set("extra_blur_um", round(extra, 4), note);
-        section.set("stray_light", default.stray_light, "the default");
+        section.set("stray_light", default.stray_light, "default");
         let mut light = Section { name: "light", about: String::new(), fields: Vec::new() };
         light.set("kind", "monochrome", "");
         light.set("wavelength_um", instrument.wavelength_um, "as given");
-        light.set("bandwidth_um", default.bandwidth_um, "the default");
+        light.set("bandwidth_um", default.bandwidth_um, "default");
         Ok(Some(format!("{}\n{}", section.to_toml(), light.table())))
     }
 
-    /// The section `[optics]` of the paper's Gaussians, in TOML; nothing if no length in micrometres is known, or nothing
-    /// was measured.
+    /// Returns the section `[optics]` with the Gaussians of the paper in TOML; `None` if lengths in micrometres are
+    /// unknown, or neither focus nor edge were measured.
     #[must_use]
     pub fn gaussian_toml(&self) -> Option<String> {
         let instrument = self.microscope.as_ref()?;
@@ -102,7 +101,7 @@ impl Calibration {
         }
         let mut section = Section {
             name: "optics",
-            about: format!("the paper's Gaussians, with pixels of {} um", instrument.pixel_um),
+            about: format!("Gaussians of the paper, with pixels of {} um", instrument.pixel_um),
             fields: Vec::new(),
         };
         section.set("kind", "gaussian", "");
@@ -113,8 +112,8 @@ impl Calibration {
             _ => Gaussians::default(),
         };
         for (key, found, paper, option) in [
-            ("sigma_xy_um", xy, paper.sigma_xy_um, "--edge finds it"),
-            ("sigma_z_um_per_um", z, paper.sigma_z_um_per_um, "--stack with --step-um finds it"),
+            ("sigma_xy_um", xy, paper.sigma_xy_um, "--edge measures it"),
+            ("sigma_z_um_per_um", z, paper.sigma_z_um_per_um, "--stack with --step-um measures it"),
         ] {
             match found {
                 Some([value, error]) => {
@@ -122,37 +121,33 @@ impl Calibration {
                 }
                 None => {
                     let paper = Value::try_from(paper).unwrap_or(Value::Float(0.0));
-                    section.set(key, paper, format!("not measured: the paper's; {option}"));
+                    section.set(key, paper, format!("not measured: value of the paper; {option}"));
                 }
             }
         }
         Some(section.to_toml())
     }
 
-    /// The section `[camera]`, in TOML; nothing if no camera was measured.
+    /// Returns the section `[camera]` in TOML, or `None` if no camera was measured.
     #[must_use]
     pub fn camera_toml(&self) -> Option<String> {
         let Camera { bits, gain_dn_per_e, full_scale_e, offset_dn, dark_noise_e, dsnu_e, prnu, .. } =
             self.camera.as_ref()?;
-        let about = format!("a camera of {gain_dn_per_e:.5} grey levels per electron");
+        let about = format!("a camera with {gain_dn_per_e:.5} grey levels per electron");
         let mut section = Section { name: "camera", about, fields: Vec::new() };
-        section.set("bits", i64::from(*bits), "of the converter");
-        section.set(
-            "full_well_e",
-            round(*full_scale_e, 0),
-            "measured: electrons that the largest grey level stands for",
-        );
-        section.set("read_noise_e", round(*dark_noise_e, 3), "measured: noise in the dark, without that of rounding");
-        section.set("offset_dn", round(*offset_dn, 3), "measured: mean in the dark");
-        section.set("prnu", round(*prnu, 5), "measured: spread of the pixels' responses");
-        section.set("dsnu_e", round(*dsnu_e, 3), "measured: spread of the pixels' offsets, electrons");
+        section.set("bits", i64::from(*bits), "bits of a grey level");
+        section.set("full_well_e", round(*full_scale_e, 0), "measured: electrons of the largest grey level");
+        section.set("read_noise_e", round(*dark_noise_e, 3), "measured: dark noise, without quantization noise");
+        section.set("offset_dn", round(*offset_dn, 3), "measured: mean dark level");
+        section.set("prnu", round(*prnu, 5), "measured: relative standard deviation of the response");
+        section.set("dsnu_e", round(*dsnu_e, 3), "measured: standard deviation of the dark signal, electrons");
         section.set("photon_noise", "exact", "");
-        section.set("dark_current_e_per_s", 0.0, "not measured: a part of the offset");
+        section.set("dark_current_e_per_s", 0.0, "not measured: included in the offset");
         Some(section.to_toml())
     }
 }
 
-/// A number of no more digits than were measured.
+/// Rounds to a number of decimals.
 fn round(value: f64, digits: usize) -> f64 {
     format!("{value:.digits$}").parse().unwrap_or(value)
 }

@@ -1,41 +1,41 @@
-//! What was found in a data set or a slide.
+//! Findings of `papsynth verify`, for a data set or a slide.
 
 use std::path::Path;
 
-use papsynth_dataset::{Finding, Mend};
+use papsynth_dataset::{Finding, Fix};
 
-use crate::exit::{self, Failure};
+use crate::exit::{self, ExitError};
 use crate::words::counted;
 
-/// Findings that are printed in full; the rest is counted.
-const MOST_FINDINGS: usize = 50;
+/// Findings that are printed at most.
+const MAX_PRINTED: usize = 50;
 
-pub(crate) fn print_findings(findings: &[Finding]) -> Result<(), Failure> {
+pub(crate) fn print_findings(findings: &[Finding]) -> Result<(), ExitError> {
     let mut text = String::new();
-    for finding in findings.iter().take(MOST_FINDINGS) {
+    for finding in findings.iter().take(MAX_PRINTED) {
         text.push_str(&format!("{}: {}\n", finding.path, finding.message));
     }
-    if findings.len() > MOST_FINDINGS {
-        text.push_str(&format!("and {} more\n", findings.len() - MOST_FINDINGS));
+    if findings.len() > MAX_PRINTED {
+        text.push_str(&format!("and {} more\n", findings.len() - MAX_PRINTED));
     }
     exit::print(&text)
 }
 
-/// Nothing found is good; else there is something to do.
-pub(crate) fn judge(dir: &Path, findings: &[Finding]) -> Result<(), Failure> {
+/// Returns an error with the commands that repair the findings, if there are any.
+pub(crate) fn check(dir: &Path, findings: &[Finding]) -> Result<(), ExitError> {
     if findings.is_empty() {
         return Ok(());
     }
-    let things = counted(findings.len() as u64, "thing is", "things are");
-    let wants = |mend: Mend| findings.iter().any(|finding| finding.mend == mend);
-    let mends: Vec<&str> = [
-        (Mend::Generate, "the command that made it, with --verify, makes again what is wrong"),
-        (Mend::Merge, "`papsynth merge` closes it when all shards are there"),
-        (Mend::Clean, "`papsynth clean --strays` takes away what does not belong there"),
+    let problems = counted(findings.len() as u64, "problem", "problems");
+    let needs = |mend: Fix| findings.iter().any(|finding| finding.fix == mend);
+    let repairs: Vec<&str> = [
+        (Fix::Generate, "to repair frames, run the command that wrote them with --verify"),
+        (Fix::Merge, "run `papsynth merge` when all shards are present"),
+        (Fix::Clean, "`papsynth clean --untracked` removes other files"),
     ]
     .into_iter()
-    .filter(|(mend, _)| wants(*mend))
-    .map(|(_, words)| words)
+    .filter(|(mend, _)| needs(*mend))
+    .map(|(_, repair)| repair)
     .collect();
-    Err(Failure::wrong(format!("{}: {things} wrong", dir.display()), mends.join("; ")))
+    Err(ExitError::with_help(format!("{}: {problems}", dir.display()), repairs.join("; ")))
 }

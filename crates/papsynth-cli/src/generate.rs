@@ -1,4 +1,4 @@
-//! `papsynth generate`: frames and their truth, and where the time went.
+//! `papsynth generate`: frames with ground truth, and the time of each stage.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -7,99 +7,100 @@ use std::time::{Duration, Instant};
 use papsynth::Threads;
 use papsynth::key::Key;
 use papsynth::profile::{Profile, Stage};
-use papsynth_dataset::memory::{Fit, Need};
-use papsynth_dataset::{Dataset, Error, FrameSummary, Home, Layout, Progress as Step, Run, Share};
+use papsynth_dataset::memory::{MemoryEstimate, MemoryPlan};
+use papsynth_dataset::{Dataset, Error, FrameSummary, Layout, Location, Progress as Step, Run, Task};
 use serde_json::json;
 
 use crate::args::{Generate, LayoutArgs, check_of};
-use crate::exit::{self, Complaint, Failure};
-use crate::memory;
+use crate::exit::{self, ErrorReport, ExitError};
+use crate::memory::{self, Budget};
 use crate::report::{self, Progress};
 use crate::setup::Setup;
+use crate::words::counted;
 
-pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
-    let account = args.profile.then(Account::open);
-    let profile = account.as_ref().map(|account| account.profile.clone());
-    let home = Home::at(&args.out)?;
+pub(crate) fn run(args: &Generate) -> Result<(), ExitError> {
+    let timing = args.profile.then(Timing::start);
+    let profile = timing.as_ref().map(|timing| timing.profile.clone());
+    let home = Location::at(&args.out)?;
     let setup = Setup::load(&args.engine, profile.clone())?;
     let seed = args.engine.seed;
     let frames = args.indices();
     let count = frames.end - frames.start;
     let (layout, chosen) = args.layout.layout(frames.end);
     if let Some(message) = layout.refusal_of(&frames) {
-        return Err(Failure::input(message));
+        return Err(ExitError::input(message));
     }
-    let share = args.share.share()?;
-    // Whole frames side by side keep every thread busy to the end; only where there are too few do threads share one.
-    let shards = count.div_ceil(layout.frames_per_shard).div_ceil(share.of);
+    let task = args.task.task()?;
+    // One frame per thread is fastest; threads share a frame only if there are fewer shards than threads.
+    let shards = count.div_ceil(layout.frames_per_shard).div_ceil(task.total);
     let few = usize::try_from(shards).ok().filter(|shards| *shards < setup.threads);
     let fit = fit(args, &setup, few, &layout)?;
-    // A slide that cannot be drawn is found out before anything is written.
-    setup.engine.scene(Key { seed, index: frames.start }).map_err(|error| setup.recipe.refuse(&error))?;
+    // Errors in the scene are reported before any file is written.
+    setup.engine.scene(Key { seed, index: frames.start }).map_err(|error| setup.recipe.error(&error))?;
 
-    if chosen && !args.quiet {
-        let most = LayoutArgs::MOST_IN_FOLDERS;
+    if chosen {
+        let limit = LayoutArgs::MAX_IN_FOLDERS;
         exit::note(format!(
-            "more than {most} frames are written as webdataset, in tar files; --format folder forces single files"
+            "more than {limit} frames are written as webdataset, in tar files; --format folder writes single files"
         ));
     }
-    let stop = exit::watch()?;
+    let stop = exit::stop_flag()?;
     let dataset = Dataset::create_or_resume(&home, &setup.info(seed, &layout))?;
-    let at_once = fit.at_once;
+    let workers = fit.workers;
     let (threads, working) = match fit.shared {
         true => (setup.threads_of_a_frame(), setup.threads),
-        false => (Threads::One, at_once),
+        false => (Threads::One, workers),
     };
     let progress = Progress::start(args, count, working, fit.bytes)?;
     let check = check_of(args.verify);
-    let run = Run { frames, share, at_once, threads, check, stop, profile: profile.as_deref() };
+    let end = frames.end;
+    let run = Run { frames, task, workers: at_once, threads, check, stop, profile: profile.as_deref() };
     let step = |step: Step| {
-        account.iter().for_each(|account| account.step(step));
+        timing.iter().for_each(|timing| timing.step(step));
         progress.step(step);
     };
     let outcome = dataset.generate(&setup.engine, &run, &step);
     progress.clear();
-    let outcome = outcome.map_err(|error| setup.failure(error))?;
+    let outcome = outcome.map_err(|error| setup.error(error))?;
     if outcome.stopped {
-        let whole = outcome.kept + outcome.made;
-        let message = format!("stopped with {whole} frames whole; every file in {} is whole", args.out.display());
-        return Err(Failure::stopped(message, "make"));
+        let complete = counted(outcome.present + outcome.written, "complete frame", "complete frames");
+        let message = format!("stopped with {complete}; every file in {} is complete", args.out.display());
+        return Err(ExitError::stopped(message));
     }
-    // What is whole is left alone, which a disk that cannot be written allows too.
-    // What others are still making is merged by whoever comes last.
-    if share == Share::ALL && (outcome.made > 0 || args.verify || !dataset.is_finished()?) {
+    // A complete data set is not written again, so that it may lie on a read-only disk.
+    // `papsynth merge` finishes the data set of several tasks.
+    if task == Task::ALL && (outcome.written > 0 || args.verify || !dataset.is_finished()?) {
         dataset.finish().map_err(|error| damaged(&error))?;
     }
-    progress.done(&outcome, share)?;
-    match account {
-        Some(account) if args.json => report::event(&account.event(setup.threads)),
-        Some(account) => exit::print(&account.table(setup.threads)),
+    progress.done(&outcome, task, end)?;
+    match timing {
+        Some(timing) if args.json => report::event(&timing.event(setup.threads)),
+        Some(timing) => exit::print(&timing.table(setup.threads)),
         None => Ok(()),
     }
 }
 
-/// How the run goes with the memory that it may use; of `few` shards, if there are fewer than threads.
-fn fit(args: &Generate, setup: &Setup, few: Option<usize>, layout: &Layout) -> Result<Fit, Failure> {
+/// The parallelism that fits into memory. `few` is the number of shards if it is below the number of threads.
+fn fit(args: &Generate, setup: &Setup, few: Option<usize>, layout: &Layout) -> Result<MemoryPlan, ExitError> {
     let recipe = &setup.recipe.recipe;
-    let need = Need::of(recipe, layout);
+    let need = MemoryEstimate::of(recipe, layout);
     let wanted = (few.map_or(setup.threads, |_| 1), few.is_some() && setup.threads > 1);
-    memory::fit(&need, setup.threads, wanted, args.max_memory, |budget| {
-        let source = if args.max_memory.is_some() { "--max-memory" } else { "80 % of what is available" };
-        let help = "smaller fields, fewer cells, one plane, grey light and less oversampling need less; \
-                    --max-memory allows more";
-        Failure::wrong(format!("{} ({source})", need.too_large(recipe, budget)), help)
+    memory::fit(&need, setup.threads, wanted, args.max_memory, |Budget { bytes, source }| {
+        let help = "smaller fields, fewer cells, one plane, monochrome light and less oversampling need less memory; \
+                    --max-memory sets another limit";
+        ExitError::with_help(format!("{} ({source})", need.too_large(recipe, bytes)), help)
     })
 }
 
-/// A frame of the right size that cannot be read.
-fn damaged(error: &Error) -> Failure {
-    let help = "a frame is damaged: the same command with --verify reads all files and makes such frames again";
-    Failure::new(error.is_io(), Complaint::new(error).help(help))
+/// A file of the right size that cannot be read.
+fn damaged(error: &Error) -> ExitError {
+    let help = "a frame is damaged: run the same command with --verify to check all files and repair such frames";
+    ExitError::new(error.is_io(), ErrorReport::new(error).help(help))
 }
 
-/// What a run made, and how long it took.
+/// Time and size of the frames of a run.
 #[derive(Debug)]
-struct Account {
+struct Timing {
     profile: Arc<Profile>,
     begun: Duration,
     frames: AtomicU64,
@@ -107,23 +108,23 @@ struct Account {
     objects: AtomicU64,
 }
 
-/// Time since this was first asked for.
-#[expect(clippy::disallowed_methods, reason = "how long something took is what is asked for; it reaches no image")]
+/// Time since the first call.
+#[expect(clippy::disallowed_methods, reason = "the time is printed and reaches no image")]
 fn now() -> Duration {
     static BEGUN: OnceLock<Instant> = OnceLock::new();
     BEGUN.get_or_init(Instant::now).elapsed()
 }
 
-impl Account {
-    fn open() -> Self {
+impl Timing {
+    fn start() -> Self {
         let profile = Arc::new(Profile::new(now));
         let zero = AtomicU64::default;
         Self { profile, begun: now(), frames: zero(), pixels: zero(), objects: zero() }
     }
 
-    /// A frame is done, or was there.
+    /// Counts a frame.
     fn step(&self, step: Step) {
-        let Step::Made(FrameSummary { width, height, channels, planes_um, objects, .. }) = step else { return };
+        let Step::Written(FrameSummary { width, height, channels, planes_um, objects, .. }) = step else { return };
         let add = |sum: &AtomicU64, value: u64| sum.fetch_add(value, Ordering::Relaxed);
         add(&self.frames, 1);
         add(&self.pixels, (width * height * channels * planes_um.len()) as u64);
@@ -135,29 +136,28 @@ impl Account {
         [&self.frames, &self.pixels, &self.objects].map(|sum| sum.load(Ordering::Relaxed) as f64 / seconds)
     }
 
-    fn milliseconds_a_frame(&self, stage: Stage) -> f64 {
+    fn ms_per_frame(&self, stage: Stage) -> f64 {
         self.profile.spent(stage).as_secs_f64() * 1e3 / self.frames.load(Ordering::Relaxed).max(1) as f64
     }
 
     fn table(&self, threads: usize) -> String {
-        let rows = Stage::ALL.map(|stage| (stage.name(), self.milliseconds_a_frame(stage)));
+        let rows = Stage::ALL.map(|stage| (stage.name(), self.ms_per_frame(stage)));
         let all: f64 = rows.iter().map(|row| row.1).sum();
-        let mut text = format!("{:<20}{:>12}{:>8}\n", "stage", "ms a frame", "share");
+        let mut text = format!("{:<20}{:>14}{:>10}\n", "stage", "ms per frame", "fraction");
         for (name, spent) in rows.into_iter().chain([("all stages", all)]) {
-            text.push_str(&format!("{name:<20}{spent:>12.2}{:>6.1} %\n", 100.0 * spent / all.max(1e-9)));
+            text.push_str(&format!("{name:<20}{spent:>14.2}{:>8.1} %\n", 100.0 * spent / all.max(1e-9)));
         }
         let [frames, pixels, objects] = self.rates();
-        let s = if threads == 1 { "" } else { "s" };
+        let threads = counted(threads as u64, "thread", "threads");
         text.push_str(&format!(
-            "{frames:.1} frames a second on {threads} thread{s}: {:.1} million pixels, {objects:.0} objects and parts a second\n",
+            "per second on {threads}: {frames:.1} frames, {:.1} million pixels, {objects:.0} objects and parts\n",
             pixels / 1e6
         ));
         text
     }
 
     fn event(&self, threads: usize) -> serde_json::Value {
-        let stages =
-            Stage::ALL.map(|stage| json!({ "stage": stage.name(), "ms_a_frame": self.milliseconds_a_frame(stage) }));
+        let stages = Stage::ALL.map(|stage| json!({ "stage": stage.name(), "ms_per_frame": self.ms_per_frame(stage) }));
         let [frames, pixels, objects] = self.rates();
         json!({
             "event": "profile", "threads": threads, "stages": stages,

@@ -1,14 +1,14 @@
-//! `papsynth inspect`: what is in a data set.
+//! `papsynth inspect`: the contents of a data set.
 
 use std::ops::Range;
 
 use papsynth_dataset::{Identity, Overview, inspect};
 
 use crate::args::{Inspect, check_of};
-use crate::exit::{self, Failure};
+use crate::exit::{self, ExitError};
 use crate::words::{counted, size};
 
-pub(crate) fn run(args: &Inspect) -> Result<(), Failure> {
+pub(crate) fn run(args: &Inspect) -> Result<(), ExitError> {
     let check = check_of(args.verify);
     let overview = inspect(&args.dir, check)?;
     if args.json {
@@ -17,18 +17,22 @@ pub(crate) fn run(args: &Inspect) -> Result<(), Failure> {
     } else {
         exit::print(&table(&args.dir.display().to_string(), &overview))?;
     }
-    let (frames, files) = (overview.defects.len(), overview.flaws.len());
-    if frames + files == 0 {
+    let (shards, files) = (overview.damaged_shards.len() as u64, overview.damaged_files.len() as u64);
+    let damaged: Vec<String> = [(shards, "shard", "shards"), (files, "file", "files")]
+        .into_iter()
+        .filter(|(count, ..)| *count > 0)
+        .map(|(count, one, many)| counted(count, one, many))
+        .collect();
+    if damaged.is_empty() {
         return Ok(());
     }
-    let (shards, files) = (counted(frames as u64, "shard", "shards"), counted(files as u64, "file", "files"));
-    let message = format!("{}: {shards} and {files} are damaged", args.dir.display());
-    let help = "the command that made the data set, with --verify, makes them again";
-    Err(Failure::wrong(message, help))
+    let message = format!("{}: damaged: {}", args.dir.display(), damaged.join(", "));
+    let help = "to repair them, run the command that wrote the data set with --verify";
+    Err(ExitError::with_help(message, help))
 }
 
-/// Lines of the lists that are printed in full; the rest is counted.
-const MOST: usize = 10;
+/// Entries of a list that are printed at most.
+const MAX_LISTED: usize = 10;
 
 fn table(dir: &str, overview: &Overview) -> String {
     let identity = &overview.manifest.identity;
@@ -44,26 +48,25 @@ fn table(dir: &str, overview: &Overview) -> String {
         row("missing", &listed(overview.missing.iter().map(shown)));
     }
     if overview.manifest.frames != overview.frames {
-        let known = overview.manifest.frames;
-        row("merged", &format!("{known} frames are in objects.csv and coco.json; `papsynth generate` merges the rest"));
+        let merged = counted(overview.manifest.frames, "frame", "frames");
+        row("merged", &format!("{merged}; `papsynth merge` adds the rest to objects.csv and coco.json"));
     }
-    for defect in overview.defects.iter().take(MOST) {
+    for defect in overview.damaged_shards.iter().take(MAX_LISTED) {
         row("damaged", &format!("shard {}: {}", defect.shard, defect.message));
     }
-    for flaw in &overview.flaws {
+    for flaw in &overview.damaged_files {
         row("damaged", flaw);
     }
     if overview.frames > 0 {
         let sizes = listed(overview.sizes.iter().map(|[width, height]| format!("{width} x {height} px")));
         let bits = listed(overview.bits.iter().map(|bits| format!("{bits} bits")));
-        let planes =
-            listed(overview.planes.iter().map(|n| format!("{n} {}", if *n == 1 { "plane" } else { "planes" })));
+        let planes = listed(overview.planes.iter().map(|n| counted(*n as u64, "plane", "planes")));
         let [least, most] = overview.pixel_um;
         let pixel = if least == most { format!("{least}") } else { format!("{least} to {most}") };
-        row("images", &format!("{sizes}; {pixel} um a pixel; {bits}; {planes}"));
+        row("images", &format!("{sizes}; {pixel} um per pixel; {bits}; {planes}"));
         row("on disk", &size(overview.bytes as f64));
         row("", "");
-        row("objects", &format!("{:<28}{:>10}{:>12}", "", "in all", "a frame"));
+        row("objects", &format!("{:<28}{:>10}{:>12}", "", "total", "per frame"));
         for (category, count) in &overview.objects {
             row("", &format!("{category:<28}{count:>10}{:>12.1}", *count as f64 / overview.frames as f64));
         }
@@ -76,10 +79,10 @@ fn shown(range: &Range<u64>) -> String {
     if range.end - range.start == 1 { range.start.to_string() } else { format!("{}..{}", range.start, range.end) }
 }
 
-/// The first few of a list.
+/// The first entries of a list.
 fn listed(items: impl ExactSizeIterator<Item = String>) -> String {
-    let more = items.len().saturating_sub(MOST);
-    let mut text = items.take(MOST).collect::<Vec<_>>().join(", ");
+    let more = items.len().saturating_sub(MAX_LISTED);
+    let mut text = items.take(MAX_LISTED).collect::<Vec<_>>().join(", ");
     if more > 0 {
         text.push_str(&format!(" and {more} more"));
     }
@@ -91,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lists_are_readable() {
+    fn long_lists_are_shortened() {
         assert_eq!(shown(&(3..4)), "3");
         assert_eq!(shown(&(3..9)), "3..9");
         assert!(listed((0..12).map(|n: u64| n.to_string()).collect::<Vec<_>>().into_iter()).ends_with("9 and 2 more"));

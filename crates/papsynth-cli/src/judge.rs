@@ -1,68 +1,81 @@
-//! `papsynth judge`: two sets of fields in, a report of how they differ out.
+//! `papsynth judge`: a report on the differences between two sets of fields.
 
 use std::collections::BTreeSet;
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use papsynth::recipe::diagnose::quoted;
 use papsynth_dataset::read::{FieldFile, FieldNuclei, Limits};
 use papsynth_dataset::{field_files, write_file};
-use papsynth_judge::{Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture, Report};
+use papsynth_judge::{
+    Control, Error, Field, FieldImage, Judge, JudgeParams, Measurer, MeasurerParams, NucleiAnnotation, NucleiFrom,
+    Progress,
+};
 use rayon::prelude::*;
 
 use crate::args;
-use crate::exit::{self, Failure};
+use crate::exit::{self, ErrorReport, ExitError};
+use crate::output_file::{Kind, check_folder};
+use crate::report::Bar;
 use crate::setup::pool;
-use crate::text_file::may_replace_in;
+use crate::words::counted;
 
-/// Files that are written, and how those begin that may be replaced.
-const PAGE: (&str, &[u8], &str) = (
+/// Output files, and the beginnings by which older ones are recognized.
+const PAGE: (&str, Kind) = (
     "report.html",
-    b"<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>papsynth judge<",
-    "an older report",
+    Kind::Text(
+        b"<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>papsynth judge<",
+        "a report of papsynth judge",
+    ),
 );
-const NUMBERS: (&str, &[u8], &str) = ("report.json", b"{\n  \"judge_report\":", "an older report");
+const NUMBERS: (&str, Kind) = ("report.json", Kind::Text(b"{\n  \"judge_report\":", "a report of papsynth judge"));
 
-/// Pixels that differ by less are of one size.
+/// Relative difference below which pixel sizes count as equal.
 const SAME_PIXEL: f64 = 0.01;
 
-/// Fewest fields of a side.
-const LEAST: usize = 2;
+/// Smallest number of fields per side.
+const MIN_FIELDS: usize = 2;
 
-/// Giveaways that are printed.
-const PRINTED: usize = 5;
-
-/// Fields of one side, each after the size of its pixels, µm.
+/// Fields of one side, each with its pixel size, µm.
 type Side = Vec<(f64, FieldFile)>;
 
-pub(crate) fn run(args: &args::Judge) -> Result<(), Failure> {
-    may_replace_in(&args.out, &[PAGE, NUMBERS])?;
+pub(crate) fn run(args: &args::Judge) -> Result<(), ExitError> {
+    check_folder(&args.out, &[PAGE, NUMBERS])?;
     let (real, synthetic) = sides(args)?;
-    // The size that all pixels are brought to.
+    // The common pixel size is the largest.
     let pixel_um = real.iter().chain(&synthetic).map(|(um, _)| *um).fold(0.0, f64::max);
     for (folder, side) in [(&args.real, &real), (&args.synthetic, &synthetic)] {
-        few_slides(folder, side);
+        note_few_slides(folder, side);
     }
     let nuclei_from = nuclei_from(args, &real, &synthetic)?;
-    let gauge = Gauge::new(&GaugeParams { pixel_um, nuclei_from, ..GaugeParams::default() }).map_err(Failure::input)?;
+    let params = MeasurerParams { pixel_um, nuclei_from, ..MeasurerParams::default() };
+    let measurer = Measurer::new(&params).map_err(ExitError::input)?;
     let params = if args.quick { JudgeParams::quick() } else { JudgeParams::default() };
-    let judge = Judge::new(&JudgeParams { seed: args.seed, ..params }).map_err(Failure::input)?;
-    let report = pool(args.threads)?.install(|| {
-        let (real, synthetic) = (measure(&real, &gauge, pixel_um)?, measure(&synthetic, &gauge, pixel_um)?);
-        judge.compare(&real, &synthetic).map_err(Failure::input)
-    })?;
+    let judge = Judge::new(&JudgeParams { seed: args.seed, ..params }).map_err(ExitError::input)?;
+    let stop = exit::stop_flag()?;
+    let bar = Bar::start(args.quiet);
+    let report = |progress: Progress| bar.update(progress.done as u64, progress.total as u64, progress.phase);
+    let control = Control { stop, report: &report };
+    let result = pool(args.threads)?.install(|| {
+        let real = measure(&real, &measurer, pixel_um, "measuring real fields", &control)?;
+        let synthetic = measure(&synthetic, &measurer, pixel_um, "measuring synthetic fields", &control)?;
+        judge.compare_with(&real, &synthetic, &control).map_err(|error| exit_error(&error, None))
+    });
+    bar.clear();
+    let report = result?;
     let mut numbers = serde_json::to_string_pretty(&report).unwrap_or_default();
     numbers.push('\n');
     for ((name, ..), text) in [(PAGE, report.to_html()), (NUMBERS, numbers)] {
         write_file(&args.out.join(name), text.as_bytes())?;
     }
-    exit::print(&told(&report, &args.out))
+    exit::print(&format!("{}{}: {}, {}\n", report.to_text(), args.out.display(), PAGE.0, NUMBERS.0))
 }
 
-/// The fields of both sides, of the groups that are asked for, with the sizes of their pixels.
-fn sides(args: &args::Judge) -> Result<(Side, Side), Failure> {
+/// The fields of both sides that `--group` selects, with their pixel sizes.
+fn sides(args: &args::Judge) -> Result<(Side, Side), ExitError> {
     let real = enough(&args.real, fields_of(&args.real, &args.group)?)?;
     let mut synthetic = field_files(&args.synthetic)?;
-    // Groups are those of the real fields: synthetic ones without any are all of the kind that is judged.
+    // Synthetic fields without groups are not filtered.
     if synthetic.iter().any(|f| !f.group.is_empty()) {
         synthetic = of_groups(&args.synthetic, synthetic, &args.group)?;
     }
@@ -71,8 +84,8 @@ fn sides(args: &args::Judge) -> Result<(Side, Side), Failure> {
     let of_real = args.pixel_um.or(recorded(&real));
     let of_synthetic = args.synthetic_pixel_um.or(recorded(&synthetic));
     let (Some(of_real), Some(of_synthetic)) = (of_real.or(of_synthetic), of_synthetic.or(of_real)) else {
-        let message = "neither folder says how large its pixels are";
-        return Err(Failure::wrong(message, "give --pixel-um, the size of a pixel in micrometres"));
+        let message = "neither folder records its pixel size";
+        return Err(ExitError::with_help(message, "give the pixel size in micrometres: --pixel-um"));
     };
     let side = |files: Vec<FieldFile>, given: Option<f64>, else_um: f64| {
         files.into_iter().map(|file| (given.or(file.pixel_um).unwrap_or(else_um), file)).collect()
@@ -80,49 +93,52 @@ fn sides(args: &args::Judge) -> Result<(Side, Side), Failure> {
     Ok((side(real, args.pixel_um, of_real), side(synthetic, args.synthetic_pixel_um, of_synthetic)))
 }
 
-/// The fields of a folder, if they are two or more.
-fn enough(folder: &Path, files: Vec<FieldFile>) -> Result<Vec<FieldFile>, Failure> {
-    if files.len() < LEAST {
-        let message = format!("{}: there is 1 field; at least {LEAST} are needed", folder.display());
-        return Err(Failure::wrong(message, "fields are never split between what is learnt from and what is tried"));
+/// Checks that a folder has enough fields.
+fn enough(folder: &Path, files: Vec<FieldFile>) -> Result<Vec<FieldFile>, ExitError> {
+    if files.len() < MIN_FIELDS {
+        let found = counted(files.len() as u64, "field", "fields");
+        let message = format!("{}: {found}; at least {MIN_FIELDS} are needed", folder.display());
+        return Err(ExitError::with_help(message, "training and test use different fields"));
     }
     Ok(files)
 }
 
-/// The fields in a folder; of these groups alone, if any are named.
-pub(crate) fn fields_of(folder: &Path, groups: &[String]) -> Result<Vec<FieldFile>, Failure> {
+/// The fields of a folder; if `groups` is not empty, only the fields of these groups.
+pub(crate) fn fields_of(folder: &Path, groups: &[String]) -> Result<Vec<FieldFile>, ExitError> {
     of_groups(folder, field_files(folder)?, groups)
 }
 
-fn of_groups(folder: &Path, mut files: Vec<FieldFile>, groups: &[String]) -> Result<Vec<FieldFile>, Failure> {
+fn of_groups(folder: &Path, mut files: Vec<FieldFile>, groups: &[String]) -> Result<Vec<FieldFile>, ExitError> {
     let wanted = |file: &FieldFile| groups.contains(&file.group);
     if files.iter().any(wanted) {
         files.retain(wanted);
     } else if !groups.is_empty() {
-        let message = format!("{}: no field is of group {}", folder.display(), groups.join(" or "));
+        let message = format!("{}: no field of group {}", folder.display(), groups.join(" or "));
         if files.iter().all(|f| f.group.is_empty()) {
-            let help = "fields have no groups there: frames.csv in that folder would name them, as frame,grade";
-            return Err(Failure::wrong(message, help));
+            let help = "the fields have no groups; frames.csv in the folder assigns them, with the columns frame,grade";
+            return Err(ExitError::with_help(message, help));
         }
         let known: BTreeSet<&str> = files.iter().map(|f| f.group.as_str()).collect();
-        return Err(Failure::wrong(message, format!("there are {}", quoted(known.into_iter()))));
+        return Err(ExitError::with_help(message, format!("groups of the folder: {}", quoted(known.into_iter()))));
     }
     Ok(files)
 }
 
-/// Fields of one slide are alike, so that a few slides are told from any others: which is no fault of theirs.
-fn few_slides(folder: &Path, side: &Side) {
+/// Prints a note if fields come from few slides, because slides differ by their stain.
+fn note_few_slides(folder: &Path, side: &Side) {
     let slides: BTreeSet<u64> = side.iter().filter_map(|(_, file)| file.slide).collect();
     if !slides.is_empty() && 2 * slides.len() < side.len() {
-        let (folder, fields, slides) = (folder.display(), side.len(), slides.len());
+        let (folder, fields) = (folder.display(), counted(side.len() as u64, "field", "fields"));
+        let slides = counted(slides.len() as u64, "slide", "slides");
         exit::note(format!(
-            "{folder}: {fields} fields of {slides} slides, which differ by their stain; more slides say more: generate with --set slide.fields=1"
+            "{folder}: {fields} from {slides}; stains differ between slides, so generate more slides for a fair test: \
+             --set slide.fields_per_slide=1"
         ));
     }
 }
 
-/// What all fields allow, or what is asked for.
-fn nuclei_from(args: &args::Judge, real: &Side, synthetic: &Side) -> Result<NucleiFrom, Failure> {
+/// The source of nuclei: `--nuclei`, or the best that all fields have.
+fn nuclei_from(args: &args::Judge, real: &Side, synthetic: &Side) -> Result<NucleiFrom, ExitError> {
     let all = |has: fn(&FieldFile) -> bool| real.iter().chain(synthetic).map(|(_, file)| file).find(|file| !has(file));
     let lacks = |from: NucleiFrom| match from {
         NucleiFrom::Masks => all(FieldFile::has_masks),
@@ -133,66 +149,54 @@ fn nuclei_from(args: &args::Judge, real: &Side, synthetic: &Side) -> Result<Nucl
         return Ok(NucleiFrom::ALL.into_iter().rev().find(|from| lacks(*from).is_none()).unwrap_or_default());
     };
     let Some(file) = lacks(from) else { return Ok(from) };
-    let message = format!("--nuclei {}: {} has none", from.name(), file.path().display());
-    Err(Failure::wrong(message, "all fields of both sides must have them"))
+    let message = format!("--nuclei {0}: {1} has no {0}", from.name(), file.path().display());
+    Err(ExitError::with_help(message, "all fields of both sides need them"))
 }
 
-fn measure(side: &Side, gauge: &Gauge, pixel_um: f64) -> Result<Vec<Field>, Failure> {
-    let measure = |(own_um, file): &(f64, FieldFile)| {
-        let factor = pixel_um / own_um;
-        let picture = picture(file)?;
-        let picture = if factor > 1.0 + SAME_PIXEL { picture.coarsened(factor) } else { picture };
-        gauge.measure(&picture).map_err(|error| Failure::input(format!("{}: {error}", file.path().display())))
+/// Measures the fields of a side at the common pixel size.
+fn measure(
+    side: &Side,
+    measurer: &Measurer,
+    common_um: f64,
+    phase: &str,
+    control: &Control,
+) -> Result<Vec<Field>, ExitError> {
+    let done = AtomicUsize::new(0);
+    let measure = |(pixel_um, file): &(f64, FieldFile)| {
+        control.check().map_err(|error| exit_error(&error, None))?;
+        let factor = common_um / pixel_um;
+        let image = field_image(file)?;
+        let image = if factor > 1.0 + SAME_PIXEL { image.coarsened(factor) } else { image };
+        let field = measurer.measure_with(&image, control).map_err(|error| exit_error(&error, Some(file)))?;
+        let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+        (control.report)(Progress { phase, done, total: side.len() });
+        Ok(field)
     };
-    let fields: Vec<Result<Field, Failure>> = side.par_iter().map(measure).collect();
+    let fields: Vec<Result<Field, ExitError>> = side.par_iter().map(measure).collect();
     fields.into_iter().collect()
 }
 
-pub(crate) fn picture(file: &FieldFile) -> Result<Picture, Failure> {
+fn exit_error(error: &Error, file: Option<&FieldFile>) -> ExitError {
+    match (error, file) {
+        (Error::Stopped, _) => ExitError::interrupted(ErrorReport::new("stopped; no file was written")),
+        (other, Some(file)) => ExitError::input(format!("{}: {other}", file.path().display())),
+        (other, None) => ExitError::input(other),
+    }
+}
+
+/// Reads a field with its nuclei.
+pub(crate) fn field_image(file: &FieldFile) -> Result<FieldImage, ExitError> {
     let image = file.read(&Limits::default())?;
-    Ok(Picture {
+    Ok(FieldImage {
         name: file.name.clone(),
         group: file.group.clone(),
         grey: image.grey.iter().map(|g| f32::from(*g)).collect(),
         width: image.width,
         full_scale: f32::from(image.white),
         nuclei: match image.nuclei {
-            FieldNuclei::Unknown => Known::Nothing,
-            FieldNuclei::Points(points) => Known::Points(points),
-            FieldNuclei::Labels(labels) => Known::Masks(labels),
+            FieldNuclei::Unknown => NucleiAnnotation::None,
+            FieldNuclei::Points(points) => NucleiAnnotation::Points(points),
+            FieldNuclei::Labels(labels) => NucleiAnnotation::Masks(labels),
         },
     })
-}
-
-fn told(report: &Report, out: &Path) -> String {
-    let mut text = String::new();
-    for test in &report.two_sample {
-        let (name, r, verdict, [low, high]) = (&test.name, &test.result, &test.verdict, test.result.interval);
-        let halves = r.null_median().map_or("unknown (too few fields)".to_owned(), |auc| format!("{auc:.3}"));
-        text.push_str(&format!(
-            "{name:<22} AUC {:.3} ({low:.3} to {high:.3}), between real halves {halves}: {verdict}\n",
-            r.auc
-        ));
-        for g in r.giveaways.iter().take(PRINTED).filter(|g| g.importance > 0.0) {
-            text.push_str(&format!(
-                "    {:<42} real {:>9.4}  synthetic {:>9.4}\n",
-                g.feature, g.real[1], g.synthetic[1]
-            ));
-        }
-    }
-    for test in &report.moments {
-        let outside = test.result.descriptors.iter().filter(|d| !d.within).count();
-        let of = test.result.descriptors.len();
-        text.push_str(&format!(
-            "{}: {outside} of {of} Q-Q slopes or shifts beyond real halves: {}\n",
-            test.name, test.verdict
-        ));
-    }
-    let [real, synthetic] = &report.fields;
-    text.push_str(&format!("{} real fields and {} synthetic ones: {}\n", real.len(), synthetic.len(), report.verdict));
-    for note in &report.notes {
-        text.push_str(&format!("note: {note}\n"));
-    }
-    text.push_str(&format!("{}: {}, {}\n", out.display(), PAGE.0, NUMBERS.0));
-    text
 }

@@ -7,6 +7,7 @@ mod calibrate;
 mod exit;
 mod findings;
 mod generate;
+mod input_file;
 mod inspect;
 #[cfg(feature = "judge")]
 mod judge;
@@ -15,59 +16,58 @@ mod learn;
 #[cfg(feature = "judge")]
 mod match_fields;
 mod memory;
+mod output_file;
 mod plan;
 mod preview;
 mod recipe_file;
 mod report;
 mod rerender;
 mod setup;
-mod share;
 mod slide;
 mod status;
 mod submit;
 mod sweep;
-mod text_file;
+mod task;
 #[cfg(feature = "web")]
 mod web;
 mod words;
 
-use std::fs::OpenOptions;
-use std::io::Write;
 use std::process::ExitCode;
 
-use clap::Parser;
 use papsynth::recipe::{Preset, Recipe};
 
 use args::{Cli, Init, Verb};
-use exit::Failure;
+use exit::ExitError;
+use output_file::{Kind, OutputFile};
 
 fn main() -> ExitCode {
-    memory::settle();
-    let cli = match Cli::try_parse() {
+    memory::configure_allocator();
+    let cli = match args::parse(std::env::args_os()) {
         Ok(cli) => cli,
         Err(error) => {
-            // Help and version arrive here too, with code 0; a closed pipe is no failure.
-            let _ = error.print();
+            // Help and version arrive here too, with exit code 0. Ignores broken pipes.
+            let _ = args::print_error(&error);
             return ExitCode::from(if error.use_stderr() { exit::INPUT } else { 0 });
         }
     };
     let json = matches!(&cli.verb, Verb::Generate(args) if args.json);
+    exit::set_quiet(cli.verb.is_quiet());
     match args::check_addresses(&cli.verb, std::env::args_os()).and_then(|()| run(cli.verb)) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            let code = failure.code();
+        Err(error) => {
+            let code = error.code();
             if json {
-                // Whoever reads JSON reads it to the end, or closed the pipe.
-                let _ = report::event(&failure.json());
+                // Ignores a standard output that cannot be written.
+                let _ = report::event(&error.json());
             } else {
-                failure.print();
+                error.print();
             }
             ExitCode::from(code)
         }
     }
 }
 
-fn run(verb: Verb) -> Result<(), Failure> {
+fn run(verb: Verb) -> Result<(), ExitError> {
     match verb {
         Verb::Init(args) => init(&args),
         Verb::Generate(args) => generate::run(&args),
@@ -107,20 +107,20 @@ fn run(verb: Verb) -> Result<(), Failure> {
             exit::print(&String::from_utf8_lossy(&script))
         }
         #[cfg(not(feature = "calibrate"))]
-        Verb::Calibrate(_) => Err(Failure::left_out("calibrate")),
+        Verb::Calibrate(_) => Err(ExitError::missing_feature("calibrate")),
         #[cfg(not(feature = "completions"))]
-        Verb::Completions(_) => Err(Failure::left_out("completions")),
+        Verb::Completions(_) => Err(ExitError::missing_feature("completions")),
         #[cfg(not(feature = "judge"))]
-        Verb::Judge(_) | Verb::Match(_) => Err(Failure::left_out("judge")),
+        Verb::Judge(_) | Verb::Match(_) => Err(ExitError::missing_feature("judge")),
         #[cfg(not(feature = "learn"))]
-        Verb::Learn(_) => Err(Failure::left_out("learn")),
+        Verb::Learn(_) => Err(ExitError::missing_feature("learn")),
         #[cfg(not(feature = "web"))]
-        Verb::Study(_) | Verb::View(_) => Err(Failure::left_out("web")),
+        Verb::Study(_) | Verb::View(_) => Err(ExitError::missing_feature("web")),
     }
 }
 
-/// `papsynth init`: a recipe to start from.
-fn init(args: &Init) -> Result<(), Failure> {
+/// `papsynth init`: prints or writes a commented recipe.
+fn init(args: &Init) -> Result<(), ExitError> {
     if args.list {
         let longest = Preset::ALL.iter().map(|preset| preset.name().len()).max().unwrap_or(0);
         let lines = Preset::ALL.map(|preset| format!("{:<longest$}  {}\n", preset.name(), preset.summary()));
@@ -129,12 +129,6 @@ fn init(args: &Init) -> Result<(), Failure> {
     let text = args.preset.recipe().to_commented_toml();
     match &args.out {
         None => exit::print(&text),
-        // A recipe that someone wrote by hand is never replaced.
-        Some(path) => OpenOptions::new()
-            .write(true)
-            .create_new(true)
-            .open(path)
-            .and_then(|mut file| file.write_all(text.as_bytes()))
-            .map_err(|error| Failure::file("write", path, &error)),
+        Some(path) => OutputFile::check(path, Kind::Recipe, args.force)?.write(text.as_bytes()),
     }
 }

@@ -1,119 +1,99 @@
-//! `papsynth match`: real fields in, the recipe of fields like them out.
-
-use std::sync::atomic::Ordering;
+//! `papsynth match`: the recipe whose fields resemble real fields.
 
 use papsynth::{Engine, Inputs};
-use papsynth_dataset::write_file;
-use papsynth_judge::Picture;
-use papsynth_match::{Answer, Error, Fit, Match, MatchParams, Origin, PixelSize, Step, TableParams};
+use papsynth_judge::{Control, FieldImage, Progress};
+use papsynth_match::{Error, Fit, Match, MatchParams, Origin, ParameterFit, PixelSize};
 use serde_json::json;
 
 use crate::args;
-use crate::exit::{self, Complaint, Failure};
-use crate::judge::{fields_of, picture};
+use crate::exit::{self, ErrorReport, ExitError};
+use crate::judge::{field_image, fields_of};
+use crate::output_file::{Kind, OutputFile, check_writable};
 use crate::report::Bar;
 use crate::setup::{pool, read_model};
-use crate::text_file::{can_write, may_replace};
+use crate::words::counted;
 
-/// How files begin that may be replaced.
-const RECIPE: &[u8] = b"# Matched to ";
-const REPORT: &[u8] = b"{\n  \"match_report\":";
+/// Output files, and the beginnings by which older ones are recognized.
+const RECIPE: Kind = Kind::Text(b"# Matched to ", "a recipe of papsynth match");
+const REPORT: Kind = Kind::Text(b"{\n  \"match_report\":", "a report of papsynth match");
 
-/// Windows that are simulated at first, of a quick run, and of each recipe at most.
-const BUDGET: usize = 2000;
-const QUICK: usize = 336;
-const WINDOWS: usize = 8;
+/// Pixel size of a 20x objective, µm: the start of the search for the pixel size.
+const DEFAULT_PIXEL_UM: f64 = 0.33;
 
-/// Fewest recipes of a table.
-const LEAST_RECIPES: usize = 30;
+/// Statistics with the largest distance that are printed.
+const MAX_PRINTED: usize = 8;
 
-const ROUNDS: usize = 8;
-const QUICK_ROUNDS: usize = 3;
-
-/// Pixels of a 20x objective, µm: where the search for their size begins.
-const USUAL_PIXEL_UM: f64 = 0.33;
-
-/// Statistics that are told of at the end: those that the recipe shows worst.
-const TOLD: usize = 8;
-
-pub(crate) fn run(args: &args::Match) -> Result<(), Failure> {
-    may_replace(&args.out, RECIPE, "an older match")?;
-    if let Some(report) = &args.report {
-        may_replace(report, REPORT, "an older report of a match")?;
-    }
+pub(crate) fn run(args: &args::Match) -> Result<(), ExitError> {
+    let recipe_file = OutputFile::check(&args.out, RECIPE, args.force)?;
+    let report_file = args.report.as_deref().map(|path| OutputFile::check(path, REPORT, args.force)).transpose()?;
     if args.report.as_ref() == Some(&args.out) {
-        let message = format!("--report {}: this is the file of the recipe; expected another", args.out.display());
-        return Err(Failure::input(message));
+        let message = format!("--report {}: the same file as --out; expected another file", args.out.display());
+        return Err(ExitError::input(message));
     }
-    let stop = exit::watch()?;
+    let stop = exit::stop_flag()?;
     let model = read_model(args.model.as_deref())?;
     let files = fields_of(&args.real, &args.group)?;
     let recorded = files.iter().find_map(|f| f.pixel_um);
     let pixel = match (args.find_pixel, args.pixel_um.or(recorded)) {
-        (true, um) => PixelSize::Sought(um.unwrap_or(USUAL_PIXEL_UM)),
+        (true, um) => PixelSize::Sought(um.unwrap_or(DEFAULT_PIXEL_UM)),
         (false, Some(um)) => PixelSize::Known(um),
         (false, None) => {
-            let message = format!("{}: nothing says how large the pixels are", args.real.display());
-            let help = "give --pixel-um, the size of a pixel in micrometres, or --find-pixel";
-            return Err(Failure::wrong(message, help));
+            let message = format!("{}: the pixel size is not recorded", args.real.display());
+            let help = "give the pixel size in micrometres with --pixel-um, or estimate it with --find-pixel";
+            return Err(ExitError::with_help(message, help));
         }
     };
-    let fields: Vec<Picture> = files.iter().map(picture).collect::<Result<_, _>>()?;
-    [Some(&args.out), args.report.as_ref()].into_iter().flatten().try_for_each(|out| can_write(out))?;
+    let fields: Vec<FieldImage> = files.iter().map(field_image).collect::<Result<_, _>>()?;
+    [Some(&args.out), args.report.as_ref()].into_iter().flatten().try_for_each(|out| check_writable(out))?;
 
-    let windows = WINDOWS.min(fields.len()).max(1);
-    let budget = args.budget.unwrap_or(if args.quick { QUICK } else { BUDGET });
-    let recipes = (budget / windows).max(LEAST_RECIPES);
-    let params = MatchParams {
-        pixel,
-        table: TableParams { recipes, windows, seed: args.seed },
-        rounds: if args.quick { QUICK_ROUNDS } else { ROUNDS },
-    };
+    let default = if args.quick { MatchParams::quick() } else { MatchParams::default() };
+    let simulations = args.simulations.unwrap_or(default.simulations);
+    let params = MatchParams { pixel, simulations, seed: args.seed, ..default };
     let base = args.preset.recipe();
-    let matching = Match::new(&params, &base).map_err(|e| refuse(&e, &args.real))?;
+    let matching = Match::new(&params, &base).map_err(|e| exit_error(&e, &args.real))?;
     let make = |recipe: &papsynth::recipe::Recipe| Engine::new(recipe, &model, &Inputs::default());
     let bar = Bar::start(args.quiet);
-    let tell = |step: Step| {
-        match step {
-            Step::Simulated(done, of) => bar.say(done as u64, of as u64, "simulated recipes"),
-            Step::Searched(done, of, distance) => {
-                bar.say(done as u64, of as u64, &format!("rounds of the search, distance {distance:.2}"));
-            }
-        }
-        !stop.load(Ordering::SeqCst)
-    };
-    let fit =
-        pool(args.threads)?.install(|| matching.run(&fields, &make, &tell)).map_err(|e| refuse(&e, &args.real))?;
+    let report = |progress: Progress| bar.update(progress.done as u64, progress.total as u64, progress.phase);
+    let control = Control { stop, report: &report };
+    let fit = pool(args.threads)?.install(|| matching.run(&fields, &make, &control));
     bar.clear();
+    let fit = fit.map_err(|error| exit_error(&error, &args.real))?;
 
-    if let Some(report) = &args.report {
+    if let Some(file) = report_file {
         let text = serde_json::to_string_pretty(&json!({ "match_report": 1, "fit": fit, "seed": args.seed }));
-        write_file(report, format!("{}\n", text.unwrap_or_default()).as_bytes())?;
+        file.write(format!("{}\n", text.unwrap_or_default()).as_bytes())?;
     }
-    write_file(&args.out, fit.to_toml().as_bytes())?;
+    recipe_file.write(fit.to_toml().as_bytes())?;
     let out = args.out.display();
-    exit::print(&format!("{}\n{out}: use it with papsynth generate {out}\n", told(&fit)))
+    exit::print(&format!("{}\n{out}: use it with papsynth generate {out}\n", summary(&fit)))
 }
 
-fn refuse(error: &Error, real: &std::path::Path) -> Failure {
+fn exit_error(error: &Error, real: &std::path::Path) -> ExitError {
     match error {
-        Error::Stopped => Failure::interrupted(Complaint::new("stopped; nothing was written")),
-        other => Failure::input(format!("{}: {other}", real.display())),
+        Error::Stopped => ExitError::interrupted(ErrorReport::new("stopped; no file was written")),
+        other => ExitError::input(format!("{}: {other}", real.display())),
     }
 }
 
-fn told(fit: &Fit) -> String {
-    let begun = if fit.extended {
-        "these fields are fused: begun from the preset as a scanner that fuses planes shows it\n"
+fn summary(fit: &Fit) -> String {
+    let extended = if fit.extended {
+        "the fields have an extended depth of field, so the match begins with that of the preset\n"
     } else {
         ""
     };
     let mut text = format!(
-        "{} fields, {} windows, {} nuclei; {} recipes simulated\n{begun}\n{:<24} {:>10} {:>21} {:>10}  from\n",
-        fit.fields, fit.windows, fit.nuclei, fit.simulated, "parameter", "value", "95 % interval", "before"
+        "{}, {}, {}; {} simulated\n{extended}\n{:<24} {:>10} {:>21} {:>10}  source\n",
+        counted(fit.fields as u64, "field", "fields"),
+        counted(fit.windows as u64, "window", "windows"),
+        counted(fit.nuclei as u64, "nucleus", "nuclei"),
+        counted(fit.simulated as u64, "recipe", "recipes"),
+        "parameter",
+        "value",
+        "95 % interval",
+        "before"
     );
     let number = |value: f64| format!("{value:.3}");
-    let line = |a: &Answer| {
+    let line = |a: &ParameterFit| {
         let [low, high] = a.interval.map(number);
         let interval = format!("{low} to {high}");
         let origin = match a.origin {
@@ -124,21 +104,21 @@ fn told(fit: &Fit) -> String {
         let name = if a.unit.is_empty() { a.parameter.name() } else { format!("{}, {}", a.parameter.name(), a.unit) };
         format!("{name:<24} {:>10} {interval:>21} {:>10}  {origin}\n", number(a.value), number(a.before))
     };
-    text.extend(fit.answers.iter().filter(|a| a.origin != Origin::NotIdentified).map(line));
+    text.extend(fit.parameters.iter().filter(|a| a.origin != Origin::NotIdentified).map(line));
     let lost: Vec<String> =
-        fit.answers.iter().filter(|a| a.origin == Origin::NotIdentified).map(|a| a.parameter.name()).collect();
+        fit.parameters.iter().filter(|a| a.origin == Origin::NotIdentified).map(|a| a.parameter.name()).collect();
     if !lost.is_empty() {
-        text.push_str(&format!("not identified, left as they were: {}\n", lost.join(", ")));
+        text.push_str(&format!("not identified, unchanged: {}\n", lost.join(", ")));
     }
     let d = fit.distance;
     text.push_str(&format!(
-        "\ndistance from the real windows, in standard errors: {:.2} before, {:.2} as estimated, {:.2} after the search\n",
+        "\ndistance to the real windows, in standard errors: {:.2} before, {:.2} after the estimate, {:.2} after the search\n",
         d.before, d.estimated, d.after
     ));
     let mut worst: Vec<_> = fit.statistics.iter().filter(|s| s.apart.is_finite()).collect();
     worst.sort_by(|a, b| b.apart.abs().total_cmp(&a.apart.abs()));
-    text.push_str("farthest apart:\n");
-    for s in worst.iter().take(TOLD) {
+    text.push_str("largest differences:\n");
+    for s in worst.iter().take(MAX_PRINTED) {
         text.push_str(&format!(
             "    {:<44} real {:>9.4}  before {:>9.4}  after {:>9.4}\n",
             s.name, s.real, s.before, s.after

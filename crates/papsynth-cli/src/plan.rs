@@ -1,4 +1,4 @@
-//! `papsynth plan`: what a data set will cost.
+//! `papsynth plan`: the cost of a data set.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -8,17 +8,18 @@ use std::time::Instant;
 use papsynth_dataset::{Check, Dataset, Format, Layout, Progress};
 
 use crate::args::Plan;
-use crate::exit::{self, Failure};
+use crate::exit::{self, ExitError};
 use crate::memory;
 use crate::setup::{Setup, run_of};
-use crate::words::size;
+use crate::words::{counted, size};
 
-/// Student's t for a two-sided interval of 95 %, for 1, 2, … degrees of freedom; beyond the table that of the normal distribution.
+/// Student's t of a two-sided 95 % interval for 1, 2, … degrees of freedom. Beyond the table, the normal distribution
+/// is used.
 const T: [f64; 15] = [12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26, 2.23, 2.20, 2.18, 2.16, 2.14, 2.13];
 
-pub(crate) fn run(args: &Plan) -> Result<(), Failure> {
+pub(crate) fn run(args: &Plan) -> Result<(), ExitError> {
     if args.per_core_hour.is_some_and(|price| !(price >= 0.0 && price.is_finite())) {
-        return Err(Failure::input("--per-core-hour: a price of 0 or more is expected"));
+        return Err(ExitError::input("--per-core-hour: expected a price of 0 or more"));
     }
     let setup = Setup::load(&args.engine, None)?;
     let (layout, _) = args.layout.layout(args.frames);
@@ -27,18 +28,18 @@ pub(crate) fn run(args: &Plan) -> Result<(), Failure> {
     exit::print(&table(args, &setup, &layout, &samples))
 }
 
-/// What the frames that were made for it cost.
+/// Time and size of the sample frames.
 struct Samples {
-    /// Seconds of each but the first.
+    /// Seconds of each frame except the first.
     seconds: Vec<f64>,
-    /// Bytes of all, by the folder that they lie in.
+    /// Bytes of all frames, by format.
     bytes: BTreeMap<String, u64>,
     count: u64,
 }
 
-#[expect(clippy::disallowed_methods, reason = "the time goes to whoever asks for it, and into no image")]
-fn sample(args: &Plan, setup: &Setup, layout: &Layout, scratch: &Scratch) -> Result<Samples, Failure> {
-    // The first frame also makes what later ones keep: it is not counted.
+#[expect(clippy::disallowed_methods, reason = "the time is printed and reaches no image")]
+fn sample(args: &Plan, setup: &Setup, layout: &Layout, scratch: &Scratch) -> Result<Samples, ExitError> {
+    // The first frame also fills caches, so it is not timed.
     let frames = 0..args.samples + 1;
     let layout = Layout { frames_per_shard: 1, ..layout.clone() };
     let dataset = Dataset::create_or_resume(&scratch.0, &setup.info(args.engine.seed, &layout))?;
@@ -46,12 +47,12 @@ fn sample(args: &Plan, setup: &Setup, layout: &Layout, scratch: &Scratch) -> Res
     let stop = AtomicBool::new(false);
     let run = run_of(frames.clone(), 1, &stop);
     let report = |_: Progress| times.lock().unwrap_or_else(|e| e.into_inner()).push(Instant::now());
-    dataset.generate(&setup.engine, &run, &report).map_err(|error| setup.failure(error))?;
+    dataset.generate(&setup.engine, &run, &report).map_err(|error| setup.error(error))?;
     let times = times.into_inner().unwrap_or_else(|e| e.into_inner());
     let seconds = times.windows(2).skip(1).map(|pair| (pair[1] - pair[0]).as_secs_f64()).collect();
     let mut bytes = BTreeMap::new();
     for shard in frames.clone() {
-        let files = dataset.whole(shard, Check::Sizes)?.map_or_else(Vec::new, |record| record.files);
+        let files = dataset.complete_record(shard, Check::Sizes)?.map_or_else(Vec::new, |record| record.files);
         for file in files {
             *bytes.entry(format_of(&file.path).to_owned()).or_insert(0) += file.bytes;
         }
@@ -59,12 +60,12 @@ fn sample(args: &Plan, setup: &Setup, layout: &Layout, scratch: &Scratch) -> Res
     Ok(Samples { seconds, bytes, count: frames.end })
 }
 
-/// The format that a file belongs to.
+/// The format of a file of a data set.
 fn format_of(path: &str) -> &str {
     let folder = path.split('/').next().unwrap_or(path);
     match Format::ALL.iter().find(|format| format.name() == folder) {
         Some(format) => format.name(),
-        None if folder == "shards" || folder == "objects" => "truth",
+        None if folder == "shards" || folder == "objects" => "ground truth",
         None => Format::Folder.name(),
     }
 }
@@ -79,27 +80,29 @@ fn table(args: &Plan, setup: &Setup, layout: &Layout, samples: &Samples) -> Stri
     let shards = args.frames.div_ceil(layout.frames_per_shard);
     let mut out = String::new();
     let mut row = |name: &str, value: String| out.push_str(&format!("{name:<14}{value}\n"));
-    row("frames", format!("{} in {shards} shards of {} ({layout})", args.frames, layout.frames_per_shard));
+    row("frames", format!("{} in {} ({layout})", args.frames, counted(shards, "shard", "shards")));
     let [ms, low, high] = [mean, (mean - half).max(0.0), mean + half].map(|seconds| 1e3 * seconds);
-    row("a frame", format!("{ms:.0} ms on one thread, {low:.0} to {high:.0} (95 %, {count} frames)"));
+    row("time", format!("{ms:.0} ms per frame and thread, 95 % interval {low:.0} to {high:.0} ({count} frames)"));
     let [all, low, high] = [mean, mean - half, mean + half].map(hours);
-    row("all", format!("{all:.2} core hours, {low:.2} to {high:.2}"));
+    row("total", format!("{all:.2} core hours, {low:.2} to {high:.2}"));
     let tasks = args.tasks.unwrap_or(1).min(shards);
-    // The slowest task has the most shards; each of its threads makes whole ones.
+    // The slowest task has the most shards; each of its threads writes complete shards.
     let most = shards.div_ceil(tasks).div_ceil(setup.threads as u64) * layout.frames_per_shard;
     let wall = duration(mean * most.min(args.frames) as f64);
-    row("wall time", format!("{wall} on {tasks} x {} threads", setup.threads));
+    let [tasks, threads] = [(tasks, "task", "tasks"), (setup.threads as u64, "thread", "threads")]
+        .map(|(n, one, many)| counted(n, one, many));
+    row("wall time", format!("{wall} on {tasks} with {threads}"));
     if let Some(price) = args.per_core_hour {
         row("price", format!("{:.2}, {:.2} to {:.2}", price * all, price * low, price * high));
     }
     let each = |bytes: u64| bytes as f64 / samples.count as f64;
     for (format, bytes) in &samples.bytes {
-        row(format, format!("{:.2} MB a frame, {} in all", each(*bytes) / 1e6, size(each(*bytes) * frames)));
+        row(format, format!("{:.2} MB per frame, {} in total", each(*bytes) / 1e6, size(each(*bytes) * frames)));
     }
     let sum: u64 = samples.bytes.values().sum();
     row("on disk", size(each(sum) * frames));
     if let Some(peak) = memory::peak() {
-        row("memory", format!("{} with one thread; about as much again for each further one", size(peak as f64)));
+        row("memory", format!("{} with 1 thread, and about as much for each other thread", size(peak as f64)));
     }
     out
 }
@@ -113,20 +116,20 @@ fn duration(seconds: f64) -> String {
     }
 }
 
-/// A folder that vanishes.
+/// A temporary folder, removed on drop.
 struct Scratch(std::path::PathBuf);
 
 impl Scratch {
-    fn new() -> Result<Self, Failure> {
+    fn new() -> Result<Self, ExitError> {
         let path = std::env::temp_dir().join(format!("papsynth-plan-{}", std::process::id()));
-        std::fs::create_dir_all(&path).map_err(|error| Failure::file("write", &path, &error))?;
+        std::fs::create_dir_all(&path).map_err(|error| ExitError::file("write", &path, &error))?;
         Ok(Self(path))
     }
 }
 
 impl Drop for Scratch {
     fn drop(&mut self) {
-        // What cannot be removed is left to the system.
+        // The system removes temporary files that remain.
         let _ = std::fs::remove_dir_all(&self.0);
     }
 }
@@ -136,9 +139,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn files_are_counted_to_their_format() {
+    fn the_format_of_a_file_follows_from_its_path() {
         let of = ["images/1.png", "cellpose/nucleus/1.tif", "shards/1.json", "objects/1.csv"].map(format_of);
-        assert_eq!(of, ["folder", "cellpose", "truth", "truth"]);
+        assert_eq!(of, ["folder", "cellpose", "ground truth", "ground truth"]);
         assert_eq!([90.0, 36_000.0].map(duration), ["90 s", "10.0 h"]);
     }
 }

@@ -1,27 +1,33 @@
-//! `papsynth preview` and `papsynth render`: one field beside its truth, and the image of one scene.
+//! `papsynth preview` and `papsynth render`: one field next to its ground truth, and the image of one scene.
 
 use std::path::Path;
 
 use papsynth::key::Key;
 use papsynth::scene::Scene;
 use papsynth::{Error, Finished, Frame, Plane};
-use papsynth_dataset::{Picture, write_file, write_png};
+use papsynth_dataset::memory::MemoryEstimate;
+use papsynth_dataset::{Layout, RgbImage};
 
 use crate::args::{EngineArgs, Preview, Render};
-use crate::exit::{self, Failure};
+use crate::exit::{self, ExitError};
+use crate::input_file;
+use crate::memory::{self, Budget};
+use crate::output_file::{Kind, OutputFile};
+use crate::report::Spinner;
 use crate::setup::Setup;
-use crate::text_file;
+use crate::words::counted;
 
-/// Pixels between the two halves.
+/// Pixels between the two images.
 const GAP: usize = 8;
 
 const GAP_GREY: u8 = 255;
 
-pub(crate) fn run(args: &Preview) -> Result<(), Failure> {
-    text_file::is_png(&args.out)?;
+pub(crate) fn run(args: &Preview) -> Result<(), ExitError> {
+    let out = OutputFile::check(&args.out, Kind::Image, args.force)?;
     let setup = Setup::load(&args.engine, None)?;
+    check_memory(&setup)?;
     let key = Key { seed: args.engine.seed, index: args.index };
-    let scene = setup.engine.scene(key).map_err(|error| setup.recipe.refuse(&error))?;
+    let scene = setup.engine.scene(key).map_err(|error| setup.recipe.error(&error))?;
     let middle = scene.planes_um.len() / 2;
     let mut shown = None;
     let finished = image(&setup, scene, |plane| {
@@ -30,14 +36,13 @@ pub(crate) fn run(args: &Preview) -> Result<(), Failure> {
         }
     })?;
     let Some(plane) = shown else { return Ok(()) };
-    let png = beside(&plane, &finished).to_png().map_err(|error| Failure::file("write", &args.out, &error))?;
-    write_file(&args.out, &png)?;
-    told(&args.out, &finished.scene)
+    out.write_rgb(&side_by_side(&plane, &finished))?;
+    print_size(&args.out, &finished.scene)
 }
 
-/// A plane on the left, the same with its truth drawn over it on the right.
-fn beside(plane: &Plane, finished: &Finished) -> Picture {
-    let (plain, truth) = (Picture::plain(plane, finished), Picture::overlay(plane, finished));
+/// A plane on the left, and the plane with outlines of its ground truth on the right.
+fn side_by_side(plane: &Plane, finished: &Finished) -> RgbImage {
+    let (plain, truth) = (RgbImage::plain(plane, finished), RgbImage::overlay(plane, finished));
     let width = finished.scene.view.width;
     let mut rgb = Vec::with_capacity(truth.rgb.len() * 2);
     for (plain, drawn) in plain.rgb.chunks(3 * width).zip(truth.rgb.chunks(3 * width)) {
@@ -45,40 +50,53 @@ fn beside(plane: &Plane, finished: &Finished) -> Picture {
         rgb.extend([GAP_GREY; 3 * GAP]);
         rgb.extend_from_slice(drawn);
     }
-    Picture { width: 2 * width + GAP, rgb }
+    RgbImage { width: 2 * width + GAP, rgb }
 }
 
-const LARGEST_SCENE: u64 = 1 << 30;
+/// Size limit of scenes, bytes.
+const MAX_SCENE_BYTES: u64 = 1 << 30;
 
 /// `papsynth render`: the image of one scene.
-pub(crate) fn render(args: Render) -> Result<(), Failure> {
-    text_file::is_png(&args.out)?;
+pub(crate) fn render(args: Render) -> Result<(), ExitError> {
+    let out = OutputFile::check(&args.out, Kind::Image, args.force)?;
     let scene = read(&args.scene)?;
     let engine = EngineArgs { recipe: args.recipe, model: args.model, seed: scene.key.seed, threads: args.threads };
     let setup = Setup::load(&engine, None)?;
     let mut planes = Vec::new();
     let finished = image(&setup, scene, |plane| planes.push(plane.clone()))?;
     let frame = Frame { planes, finished };
-    let (picture, scene) = (frame.picture(), &frame.finished.scene);
-    write_png(&args.out, &picture, scene.view.width, scene.channels(), scene.camera.bits, scene.view.pixel_um)?;
-    told(&args.out, scene)
+    let (levels, scene) = (frame.image(), &frame.finished.scene);
+    out.write_levels(&levels, scene.view.width, scene.channels(), scene.camera.bits, scene.view.pixel_um)?;
+    print_size(&args.out, scene)
 }
 
-fn image(setup: &Setup, scene: Scene, mut keep: impl FnMut(&Plane)) -> Result<Finished, Failure> {
+/// Checks that one frame fits into memory.
+pub(crate) fn check_memory(setup: &Setup) -> Result<(), ExitError> {
+    let recipe = &setup.recipe.recipe;
+    let need = MemoryEstimate::of(recipe, &Layout::default());
+    let fit = memory::fit(&need, setup.threads, (1, false), None, |Budget { bytes, source }| {
+        let help = "smaller fields, fewer cells, one plane, monochrome light and less oversampling need less memory";
+        ExitError::with_help(format!("{} ({source})", need.too_large(recipe, bytes)), help)
+    });
+    fit.map(drop)
+}
+
+fn image(setup: &Setup, scene: Scene, mut keep: impl FnMut(&Plane)) -> Result<Finished, ExitError> {
     let keep = |plane: &Plane| {
         keep(plane);
         Ok(())
     };
+    let _spinner = Spinner::start("rendering");
     let finished = setup.engine.image::<Error>(scene, setup.threads_of_a_frame(), keep);
-    finished.map_err(|error| setup.recipe.refuse(&error))
+    finished.map_err(|error| setup.recipe.error(&error))
 }
 
-fn told(out: &Path, Scene { view, objects, .. }: &Scene) -> Result<(), Failure> {
+fn print_size(out: &Path, Scene { view, objects, .. }: &Scene) -> Result<(), ExitError> {
     let (out, width, height) = (out.display(), view.width, view.height);
-    exit::print(&format!("{out}: {width} x {height} px, {} objects\n", objects.len()))
+    exit::print(&format!("{out}: {width} x {height} px, {}\n", counted(objects.len() as u64, "object", "objects")))
 }
 
-fn read(path: &Path) -> Result<Scene, Failure> {
-    let (name, text) = text_file::read(path, LARGEST_SCENE, "a scene")?;
-    Scene::from_json(&text).map_err(|error| Failure::input(format!("{name}: {error}")))
+fn read(path: &Path) -> Result<Scene, ExitError> {
+    let (name, text) = input_file::read(path, MAX_SCENE_BYTES, "a scene")?;
+    Scene::from_json(&text).map_err(|error| ExitError::input(format!("{name}: {error}")))
 }

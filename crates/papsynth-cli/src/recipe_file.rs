@@ -1,4 +1,4 @@
-//! The recipe that the command line asks for: a file or a preset, with single fields set over it.
+//! The recipe of a command line: a file or a preset, with the changes of `--with`, `--camera` and `--set`.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,25 +9,27 @@ use papsynth::recipe::{Preset, Recipe};
 use toml::{Table, Value};
 
 use crate::args::RecipeArgs;
-use crate::exit::{Complaint, Failure};
-use crate::text_file;
+use crate::exit::{ErrorReport, ExitError};
+use crate::input_file;
+use crate::words::counted;
 
-/// Largest recipe that is read: a thousand times the largest that `papsynth init` prints would still fit.
-const LARGEST: u64 = 1 << 20;
+/// Size limit of recipes, bytes: far above the size of commented recipes.
+const MAX_BYTES: u64 = 1 << 20;
 
-const MOST_FAULTS: usize = 12;
+/// Invalid fields that are reported at most.
+const MAX_FAULTS: usize = 12;
 
-/// A recipe, and where its fields were written.
+/// A recipe and the texts that it was read from.
 #[derive(Debug)]
 pub(crate) struct RecipeFile {
-    /// The recipe, with everything set over it.
+    /// The recipe with all changes.
     pub(crate) recipe: Recipe,
-    /// The folder that files named by the recipe are relative to.
+    /// The folder to which paths in the recipe are relative.
     pub(crate) folder: PathBuf,
     sources: Sources,
 }
 
-/// The texts that the user wrote.
+/// The texts of the user, for the locations of errors.
 #[derive(Debug)]
 struct Sources {
     file: Option<(String, Arc<String>)>,
@@ -38,28 +40,28 @@ struct Sources {
 #[derive(Debug)]
 struct Set {
     argument: Arc<String>,
-    /// The key before its `=`.
+    /// The text before `=`.
     key: String,
-    /// Where its value begins in that.
+    /// Byte at which the value begins in the argument.
     value_at: usize,
-    /// What it sets, as a table of tables.
+    /// The key and the value as nested tables.
     table: Table,
     path: Vec<String>,
 }
 
 impl RecipeFile {
-    /// Reads the recipe and lays over it what was set.
-    pub(crate) fn load(args: &RecipeArgs) -> Result<Self, Failure> {
+    /// Reads the recipe and applies the changes of the command line.
+    pub(crate) fn load(args: &RecipeArgs) -> Result<Self, ExitError> {
         let sets = args.set.iter().map(|argument| Set::parse(argument)).collect::<Result<Vec<_>, _>>()?;
         let (mut base, file, folder) = match &args.recipe {
             None => (args.preset.unwrap_or(Preset::Lbc).recipe(), None, PathBuf::new()),
             Some(path) => {
-                let (recipe, file) = read(path, "a recipe", "the recipe cannot be read")?;
+                let (recipe, file) = read(path, "a recipe")?;
                 (recipe, Some(file), path.parent().map(Path::to_path_buf).unwrap_or_default())
             }
         };
         for path in &args.with {
-            let (found, (_, text)) = read(path, "sections of a recipe", "these sections cannot be read")?;
+            let (found, (_, text)) = read(path, "sections of a recipe")?;
             let sections: Table = toml::from_str(&text).unwrap_or_default();
             base.replace(&found, |section| sections.contains_key(section));
         }
@@ -69,31 +71,31 @@ impl RecipeFile {
         let sources = Sources { file, sets };
         let recipe = sources
             .overlay(base)
-            .map_err(|faults| Failure::from(sources.complaint(faults, "what is set does not fit the recipe")))?;
+            .map_err(|faults| ExitError::from(sources.report(faults, "invalid fields in --set")))?;
         let found = Self { recipe, folder, sources };
         match found.recipe.problems() {
             problems if problems.is_empty() => Ok(found),
-            problems => Err(found.refuse(&papsynth::Error::Recipe(problems))),
+            problems => Err(found.error(&papsynth::Error::Recipe(problems))),
         }
     }
 
-    /// Every class of cells must be one of the model's.
-    pub(crate) fn check_classes(&self, model: &Model) -> Result<(), Failure> {
+    /// Checks that the model has all classes of the recipe.
+    pub(crate) fn check_classes(&self, model: &Model) -> Result<(), ExitError> {
         let faults = diagnose::unknown_classes(&self.recipe, model);
         match faults.is_empty() {
             true => Ok(()),
-            false => Err(Failure::from(self.sources.complaint(faults, "the model lacks classes"))),
+            false => Err(ExitError::from(self.sources.report(faults, "classes that the model does not have"))),
         }
     }
 
-    /// What is wrong with one field, at the place where it was written.
-    pub(crate) fn complaint(&self, field: &str, message: String) -> Complaint {
+    /// An error in one field, with its location.
+    pub(crate) fn report(&self, field: &str, message: String) -> ErrorReport {
         let path = field.split('.').map(str::to_owned).collect();
-        self.sources.place(Fault { path, span: None, message, help: None })
+        self.sources.located(Fault { path, span: None, message, help: None })
     }
 
-    /// What the engine says against the recipe, at the places where its fields were written.
-    pub(crate) fn refuse(&self, error: &papsynth::Error) -> Failure {
+    /// An error of the engine, with the locations of its fields.
+    pub(crate) fn error(&self, error: &papsynth::Error) -> ExitError {
         let schema = Schema::new();
         let (fields, heading) = match error {
             papsynth::Error::Recipe(problems) => {
@@ -101,32 +103,36 @@ impl RecipeFile {
                     .iter()
                     .map(|p| (p.field.clone(), diagnose::middle_left_out(&p.to_string())))
                     .collect::<Vec<_>>();
-                (fields, "the recipe asks for what cannot be")
+                (fields, "invalid fields in the recipe")
             }
-            papsynth::Error::Layout(_) => return Failure::from(self.complaint("layout", error.to_string())),
-            other => return Failure::input(other),
+            papsynth::Error::Layout(_) => return ExitError::from(self.report("layout", error.to_string())),
+            other => return ExitError::input(other),
         };
         let faults = fields.into_iter().map(|(field, message)| {
             let path: Vec<String> = field.split('.').map(str::to_owned).collect();
-            let meaning = schema.at(&path).and_then(|section| section.meaning()).map(|m| format!("the field: {m}"));
+            let meaning =
+                schema.at(&path).and_then(|section| section.meaning()).map(|m| format!("meaning of the field: {m}"));
             Fault { path, span: None, message, help: meaning }
         });
-        Failure::from(self.sources.complaint(faults.collect(), heading))
+        ExitError::from(self.sources.report(faults.collect(), heading))
     }
 }
 
-/// The recipe of a file, and the name and the text of that.
-fn read(path: &Path, what: &str, heading: &str) -> Result<(Recipe, (String, Arc<String>)), Failure> {
-    let (name, text) = text_file::read(path, LARGEST, &format!("{what}, a few kilobytes of text"))?;
+/// Reads a recipe, and returns it with the name and the text of its file.
+fn read(path: &Path, expected: &str) -> Result<(Recipe, (String, Arc<String>)), ExitError> {
+    let (name, text) = input_file::read(path, MAX_BYTES, &format!("{expected}, a few kilobytes of text"))?;
     let file = (name, Arc::new(text));
     match diagnose::read(&file.1) {
         Ok(recipe) => Ok((recipe, file)),
-        Err(faults) => Err(Sources { file: Some(file), sets: Vec::new() }.complaint(faults, heading).into()),
+        Err(faults) => {
+            let heading = format!("invalid fields in {}", file.0);
+            Err(Sources { file: Some(file), sets: Vec::new() }.report(faults, &heading).into())
+        }
     }
 }
 
 impl Sources {
-    /// The recipe with every `--set` laid over it, in the order given.
+    /// Applies every `--set` to a recipe, in their order.
     fn overlay(&self, base: Recipe) -> Result<Recipe, Vec<Fault>> {
         if self.sets.is_empty() {
             return Ok(base);
@@ -134,57 +140,58 @@ impl Sources {
         let fault = |message: String| vec![Fault { path: Vec::new(), span: None, message, help: None }];
         let mut table: Table = toml::from_str(&base.to_toml()).map_err(|e| fault(e.to_string()))?;
         for set in &self.sets {
-            // Which cells there are is one answer; a field of one class is another.
+            // `cells` replaces all classes; a field of one class changes only this field.
             if set.key == "cells" {
                 table.remove("cells");
             }
             merge(&mut table, &set.table);
         }
         let text = toml::to_string(&table).map_err(|e| fault(e.to_string()))?;
-        // The places found in this text mean nothing to the user; the paths do.
+        // The user does not see this text, so only the paths of the fields are kept.
         diagnose::read(&text).map_err(|faults| faults.into_iter().map(|f| Fault { span: None, ..f }).collect())
     }
 
-    /// Faults at the places where the user wrote the fields: the last `--set` that touches one, or the file.
-    fn complaint(&self, faults: Vec<Fault>, heading: &str) -> Complaint {
-        let more = faults.len().saturating_sub(MOST_FAULTS);
-        let mut complaints: Vec<_> = faults.into_iter().take(MOST_FAULTS).map(|f| self.place(f)).collect();
+    /// Errors with their locations: the last `--set` of the field, or the file.
+    fn report(&self, faults: Vec<Fault>, heading: &str) -> ErrorReport {
+        let heading = format!("{} {heading}", faults.len());
+        let more = faults.len().saturating_sub(MAX_FAULTS);
+        let mut reports: Vec<_> = faults.into_iter().take(MAX_FAULTS).map(|f| self.located(f)).collect();
         if more > 0 {
-            complaints.push(Complaint::new(format!("and {more} more")));
+            reports.push(ErrorReport::new(counted(more as u64, "more error", "more errors")));
         }
-        Complaint::all(heading, complaints)
+        ErrorReport::all(heading, reports)
     }
 
-    fn place(&self, fault: Fault) -> Complaint {
-        let complaint = |message: String| match &fault.help {
-            Some(help) => Complaint::new(message).help(help),
-            None => Complaint::new(message),
+    fn located(&self, fault: Fault) -> ErrorReport {
+        let report = |message: String| match &fault.help {
+            Some(help) => ErrorReport::new(message).help(help),
+            None => ErrorReport::new(message),
         };
         if let Some(set) = self.sets.iter().rev().find(|set| set.touches(&fault.path)) {
-            return complaint(fault.message).at("--set", &set.argument, set.value_at..set.argument.len());
+            return report(fault.message).at("--set", &set.argument, set.value_at..set.argument.len());
         }
         match &self.file {
             Some((name, text)) => match fault.span.or_else(|| diagnose::find(text, &fault.path)) {
-                Some(span) => complaint(fault.message).at(name, text, span),
-                None => complaint(format!("{name}: {}", fault.message)),
+                Some(span) => report(fault.message).at(name, text, span),
+                None => report(format!("{name}: {}", fault.message)),
             },
-            None => complaint(fault.message),
+            None => report(fault.message),
         }
     }
 }
 
 impl Set {
-    fn parse(argument: &str) -> Result<Self, Failure> {
+    fn parse(argument: &str) -> Result<Self, ExitError> {
         let text = Arc::new(argument.to_owned());
         let wrong = |message: &str, span| {
-            let help = "write it like --set field.width_px=512 or --set 'slide.depth_um={ uniform = [2, 6] }'";
-            Failure::from(Complaint::new(message).at("--set", &text, span).help(help))
+            let help = "examples: --set field.width_px=512, --set 'slide.depth_um={ uniform = [2, 6] }'";
+            ExitError::from(ErrorReport::new(message).at("--set", &text, span).help(help))
         };
         let Some((key, value)) = argument.split_once('=') else {
-            return Err(wrong("expected a field and its value with `=` between them", 0..argument.len()));
+            return Err(wrong("expected FIELD=VALUE", 0..argument.len()));
         };
         let value_at = key.len() + 1;
-        // A bare word stands for itself, so that no one has to quote quotes for a shell.
+        // A bare word is a string, so that a shell needs no quotes.
         let is_word = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.' | '/');
         let parse = |value: &str| toml::from_str::<Table>(&format!("{key} = {value}\n"));
         let trimmed = value.trim();
@@ -196,7 +203,7 @@ impl Set {
         };
         let table = table.map_err(|error| {
             let at = error.span().map_or(value_at, |s| s.start);
-            // The text that was parsed has ` = ` where the argument has `=`.
+            // The parsed text has ` = ` where the argument has `=`.
             let at = if at > key.len() { at.saturating_sub(2).max(value_at) } else { at };
             wrong(error.message(), at.min(argument.len())..argument.len())
         })?;
@@ -204,13 +211,13 @@ impl Set {
         Ok(Self { argument: text.clone(), key: key.trim().to_owned(), value_at, table, path })
     }
 
-    /// Whether the path it sets and another lead through one another.
+    /// Whether one of the two paths contains the other.
     fn touches(&self, path: &[String]) -> bool {
         self.path.iter().zip(path).all(|(a, b)| a == b)
     }
 }
 
-/// The path through tables of one key each.
+/// The path of the first key in nested tables of one key each.
 fn leaf(table: &Table) -> Vec<String> {
     let mut path = Vec::new();
     let mut table = table;
@@ -224,16 +231,16 @@ fn leaf(table: &Table) -> Vec<String> {
     path
 }
 
-/// Lays a table over another, field by field. A distribution, or a table of another kind, takes the place of the
-/// whole: its fields belong together.
+/// Merges a table into another, field by field. A distribution, or a table of another kind, replaces the complete
+/// table.
 fn merge(base: &mut Table, over: &Table) {
-    const LAWS: [&str; 4] = ["uniform", "normal", "log_normal", "choice"];
+    const DISTRIBUTIONS: [&str; 4] = ["uniform", "normal", "log_normal", "choice"];
     for (name, value) in over {
         match (base.get_mut(name), value) {
             (Some(Value::Table(inner)), Value::Table(over)) => {
-                let is_law = LAWS.iter().any(|law| over.contains_key(*law));
+                let is_distribution = DISTRIBUTIONS.iter().any(|name| over.contains_key(*name));
                 let is_other_kind = over.get("kind").is_some_and(|kind| inner.get("kind") != Some(kind));
-                if is_law || is_other_kind {
+                if is_distribution || is_other_kind {
                     *inner = over.clone();
                 } else {
                     merge(inner, over);
@@ -253,7 +260,7 @@ mod tests {
     fn load(preset: Preset, sets: &[&str]) -> Result<Recipe, String> {
         let set = sets.iter().map(|&s| s.to_owned()).collect();
         let args = RecipeArgs { recipe: None, preset: Some(preset), with: Vec::new(), camera: None, set };
-        RecipeFile::load(&args).map(|found| found.recipe).map_err(|failure| failure.json().to_string())
+        RecipeFile::load(&args).map(|found| found.recipe).map_err(|error| error.json().to_string())
     }
 
     #[test]
@@ -266,18 +273,18 @@ mod tests {
     }
 
     #[test]
-    fn distributions_and_kinds_replace_the_whole() {
+    fn distributions_and_kinds_replace_the_complete_table() {
         use papsynth::recipe::{Layout, Number};
         let recipe = load(Preset::Lbc, &["layout.kind=uniform", "slide.depth_um={ normal = [4, 0.5] }"]).unwrap();
         assert_eq!(recipe.layout, Layout::Uniform {});
         assert_eq!(recipe.slide.depth_um, Number::normal(4.0, 0.5));
-        let sets = ["layout.kind=swath", "layout.width_um=50", "layout.outside=0.1"];
-        let swath = Layout::Swath(papsynth::recipe::Swath { width_um: 50.0.into(), outside: 0.1.into() });
-        assert_eq!(load(Preset::Lbc, &sets).unwrap().layout, swath);
-        // The later one wins.
+        let sets = ["layout.kind=band", "layout.width_um=50", "layout.outside=0.1"];
+        let band = Layout::Band(papsynth::recipe::Band { width_um: 50.0.into(), outside: 0.1.into() });
+        assert_eq!(load(Preset::Lbc, &sets).unwrap().layout, band);
+        // The last one counts.
         let recipe = load(Preset::Lbc, &["field.width_px=96", "field.width_px=64"]).unwrap();
         assert_eq!(recipe.field.width_px, 64.0.into());
-        // A bound is laid over the distribution it bounds.
+        // A bound is added to the distribution.
         let recipe = load(Preset::Lbc, &["slide.depth_um={uniform=[2, 6]}", "slide.depth_um.max=5"]).unwrap();
         assert_eq!(recipe.slide.depth_um.bounds(), [2.0, 5.0]);
     }
@@ -289,7 +296,7 @@ mod tests {
             ("field.width_px=-3", "field.width_px: -3 is outside 16 to 32768"),
             ("field.width_px=nan", "field.width_px: NaN"),
             ("field.width_px=wide", "is a text"),
-            ("field.width_px", "with `=` between them"),
+            ("field.width_px", "expected FIELD=VALUE"),
             ("field.width_px=", "--set"),
             ("=3", "--set"),
             ("field.width_px=[1,", "--set"),
@@ -307,15 +314,15 @@ mod tests {
     }
 
     #[test]
-    fn a_field_that_clashes_with_a_default_names_both() {
+    fn a_conflict_with_a_default_names_both_fields() {
         let error = load(Preset::Lbc, &["nucleus.patch_um=0.6"]).unwrap_err();
         assert!(error.contains("nucleus.overlap_um") && error.contains("nucleus.patch_um"), "{error}");
     }
 
     proptest::proptest! {
-        /// Whatever stands in a `--set`: an answer, and no panic.
+        /// No `--set` panics.
         #[test]
-        fn anything_can_be_set_or_is_refused(argument in "(field|layout|cells|[a-z.\"']{0,12})[.=]{0,2}\\PC{0,24}") {
+        fn any_set_is_accepted_or_rejected(argument in "(field|layout|cells|[a-z.\"']{0,12})[.=]{0,2}\\PC{0,24}") {
             if let Err(error) = load(Preset::Lbc, &[&argument]) {
                 proptest::prop_assert!(error.contains("--set"), "{}", error);
             }

@@ -1,20 +1,22 @@
-//! How far the work is: a bar on a terminal, lines elsewhere, JSON, or nothing.
+//! Progress of a run: a bar on a terminal, lines elsewhere, JSON events, or nothing.
 
 use std::io::{self, IsTerminal, Write};
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use papsynth_dataset::{Outcome, Progress as Step, Share};
+use papsynth_dataset::{Outcome, Progress as Step, Task};
 use serde_json::json;
 
 use crate::args::Generate;
-use crate::exit::{self, Failure};
+use crate::exit::{self, ExitError, escaped};
 use crate::memory;
-use crate::words::counted;
+use crate::words::{counted, frames_written};
 
-/// Lines that a run prints at most, however many frames it makes.
-const MOST_LINES: u64 = 100;
+/// Progress lines of a run at most, for any number of frames.
+const MAX_LINES: u64 = 100;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Style {
@@ -34,14 +36,19 @@ impl Style {
         }
     }
 
-    /// A bar of so many steps: it counts and estimates in every style, and is drawn in one.
+    /// A bar with this many steps. All styles use it to count and to estimate; only `Bar` draws it.
     fn bar(self, steps: u64) -> ProgressBar {
         let target = if self == Self::Bar { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        ProgressBar::with_draw_target(Some(steps), target)
+        let bar = ProgressBar::with_draw_target(Some(steps), target);
+        if self == Self::Bar {
+            // The elapsed time advances between steps.
+            bar.enable_steady_tick(Duration::from_secs(1));
+        }
+        bar
     }
 }
 
-/// Says how far a run is. Shared by all threads.
+/// Progress of `papsynth generate`. Shared by all threads.
 #[derive(Debug)]
 pub(crate) struct Progress<'a> {
     style: Style,
@@ -50,48 +57,46 @@ pub(crate) struct Progress<'a> {
 }
 
 impl<'a> Progress<'a> {
-    /// Announces a run that makes so many frames on so many threads, with so many bytes of memory at most.
-    pub(crate) fn start(args: &'a Generate, frames: u64, threads: usize, memory: u64) -> Result<Self, Failure> {
+    /// Starts the progress of a run; `memory` is the expected peak, bytes.
+    pub(crate) fn start(args: &'a Generate, frames: u64, threads: usize, memory: u64) -> Result<Self, ExitError> {
         let style = Style::of(args.quiet, args.json);
         let (dir, bar) = (args.out.as_path(), style.bar(frames));
-        bar.set_style(look("{msg}", "frames, {elapsed} gone"));
-        bar.set_message(dir.display().to_string());
+        bar.set_style(bar_style("{msg}", "frames, {elapsed} elapsed"));
+        bar.set_message(escaped(&dir.display().to_string()).into_owned());
         if style == Style::Json {
             let seed = args.engine.seed;
             event(&json!({
                 "event": "start", "dir": dir, "seed": seed, "frames": frames, "threads": threads, "memory_bytes": memory,
             }))?;
         }
-        if style == Style::Bar {
-            bar.tick();
-            // Frames may take a while: the clock runs on between them.
-            bar.enable_steady_tick(Duration::from_secs(1));
-        }
         Ok(Self { style, dir, bar })
     }
 
-    /// A frame is done, or was there. Whoever closed the stream that this is told on no longer wants to know.
+    /// Counts a frame. Ignores broken pipes.
     pub(crate) fn step(&self, step: Step) {
         let summary = match step {
-            // What is there already takes no time and says nothing about the time left.
-            Step::Kept(_) => return self.bar.dec_length(1),
-            Step::Made(summary) => summary,
+            // Frames that are already present do not count towards the estimate.
+            Step::Present(_) => return self.bar.dec_length(1),
+            Step::Written(summary) => summary,
         };
         self.bar.inc(1);
         if self.style == Style::Bar && self.bar.position() == 1 {
-            // Before the first frame there is nothing to estimate from.
-            self.bar.set_style(look("{msg}", "frames, {elapsed} gone, about {eta} left"));
+            // There is no estimate before the first frame.
+            self.bar.set_style(bar_style("{msg}", "frames, {elapsed} elapsed, about {eta} left"));
         }
         let (index, objects) = (summary.index, summary.objects.values().sum::<u64>());
         match self.style {
             Style::Json => {
-                let (done, of) = (self.bar.position(), self.bar.length().unwrap_or_default());
-                let left_s = self.bar.eta().as_secs();
+                let (done, total) = (self.bar.position(), self.bar.length().unwrap_or_default());
+                let eta_s = self.bar.eta().as_secs();
                 let _ = event(&json!({
-                    "event": "frame", "index": index, "objects": summary.objects, "done": done, "of": of, "left_s": left_s,
+                    "event": "frame", "index": index, "objects": summary.objects, "done": done, "total": total, "eta_s": eta_s,
                 }));
             }
-            Style::Lines => line(&self.bar, &format!("frame {index}: {objects} objects and parts")),
+            Style::Lines => {
+                let objects = counted(objects, "object or part", "objects and parts");
+                print_line(&self.bar, &format!("frame {index}: {objects}"));
+            }
             Style::Bar | Style::Quiet => {}
         }
     }
@@ -100,53 +105,82 @@ impl<'a> Progress<'a> {
         self.bar.finish_and_clear();
     }
 
-    /// Everything is done.
-    pub(crate) fn done(&self, outcome: &Outcome, share: Share) -> Result<(), Failure> {
-        let (dir, Outcome { made, kept, .. }) = (self.dir, outcome);
+    /// Prints the result of a run of frames up to index `end`.
+    pub(crate) fn done(&self, outcome: &Outcome, task: Task, end: u64) -> Result<(), ExitError> {
+        let (dir, Outcome { written, present, .. }) = (self.dir, outcome);
         match self.style {
             Style::Json => event(&json!({
-                "event": "done", "dir": dir, "made": made, "kept": kept, "peak_memory_bytes": memory::peak(),
+                "event": "done", "dir": dir, "written": written, "present": present, "peak_memory_bytes": memory::peak(),
             })),
             Style::Quiet => Ok(()),
             Style::Bar | Style::Lines => {
-                let (dir, frames) = (dir.display(), counted(*made, "frame", "frames"));
-                let there = if *kept > 0 { format!(", {kept} were there") } else { String::new() };
-                let next = match share {
-                    Share::ALL => format!("Look at: {dir}/contact-sheet.png"),
-                    Share { index, of } => {
-                        format!("That was share {index} of {of}; when all are done: papsynth merge {dir} --frames …")
-                    }
+                let (dir, frames) = (dir.display(), frames_written(*written, *present));
+                let next = match task {
+                    Task::ALL => format!("Look at: {dir}/contact-sheet.png"),
+                    Task { index, total } => format!(
+                        "Task {index} of {total} is done. When all tasks are done, run: papsynth merge {dir} --frames {end}"
+                    ),
                 };
-                exit::print(&format!("{dir}: {frames} made{there}\n{next}\n"))
+                exit::print(&format!("{dir}: {frames}\n{next}\n"))
             }
         }
     }
 }
 
-/// Says how far work in few large steps is.
+/// Progress of work in phases with steps.
 #[derive(Debug)]
-#[cfg(any(feature = "judge", feature = "zarr"))]
 pub(crate) struct Bar {
     style: Style,
     bar: ProgressBar,
+    phase: Mutex<Phase>,
 }
 
-#[cfg(any(feature = "judge", feature = "zarr"))]
+/// The current phase: its name, its steps, and the time of the bar at its begin.
+#[derive(Debug, Default)]
+struct Phase {
+    name: String,
+    done: u64,
+    total: u64,
+    begin: Duration,
+}
+
 impl Bar {
     pub(crate) fn start(quiet: bool) -> Self {
         let style = Style::of(quiet, false);
         let bar = style.bar(0);
-        bar.set_style(look("", "{msg}, {elapsed} gone, about {eta} left"));
-        Self { style, bar }
+        bar.set_style(bar_style("", "{msg}, {elapsed} elapsed"));
+        Self { style, bar, phase: Mutex::default() }
     }
 
-    /// A step is done. Whoever closed the stream that this is told on no longer wants to know.
-    pub(crate) fn say(&self, done: u64, all: u64, what: &str) {
-        self.bar.set_length(all);
+    /// A bar on a terminal, and no lines elsewhere.
+    pub(crate) fn on_terminal() -> Self {
+        Self::start(!io::stderr().is_terminal())
+    }
+
+    /// Sets the number of completed steps. A phase with another name continues the former one if `done` increases and
+    /// `total` does not change. Ignores steps that arrive late, and broken pipes.
+    pub(crate) fn update(&self, done: u64, total: u64, name: &str) {
+        let mut phase = self.phase.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_later = done <= phase.done;
+        let is_repeated = phase.done == phase.total && done == 1;
+        if total != phase.total || (is_later && (name != phase.name || is_repeated)) {
+            *phase = Phase { name: name.to_owned(), done, total, begin: self.bar.elapsed() };
+            // The time before the first report of a phase belongs to the phase before.
+            self.bar.set_length(total);
+        } else if is_later {
+            return;
+        }
+        (phase.done, phase.name) = (done, name.to_owned());
+        let spent = self.bar.elapsed().saturating_sub(phase.begin).as_secs_f64();
+        let left = match done < total && done > 1 && spent > 0.0 {
+            // The first report begins the phase, so `done − 1` steps took this time.
+            true => format!(", about {} left", duration((spent * (total - done) as f64 / (done - 1) as f64).round())),
+            false => String::new(),
+        };
         self.bar.set_position(done);
-        self.bar.set_message(what.to_owned());
-        if self.style == Style::Lines {
-            line(&self.bar, what);
+        self.bar.set_message(format!("{}{left}", escaped(name)));
+        if self.style == Style::Lines && is_line_due(done, total) {
+            let _ = writeln!(io::stderr().lock(), "{} ({done} of {total}{left})", escaped(name));
         }
     }
 
@@ -155,33 +189,79 @@ impl Bar {
     }
 }
 
-/// The bar, between what stands before it and after its numbers.
-fn look(before: &str, after: &str) -> ProgressStyle {
+/// Progress over the frames of `convert`, `rerender` and `sweep`. Shared by all threads.
+#[derive(Debug)]
+pub(crate) struct FrameCounter {
+    bar: Bar,
+    done: AtomicU64,
+    total: u64,
+}
+
+impl FrameCounter {
+    pub(crate) fn start(quiet: bool, total: u64) -> Self {
+        Self { bar: Bar::start(quiet), done: AtomicU64::new(0), total }
+    }
+
+    pub(crate) fn step(&self) {
+        self.bar.update(self.done.fetch_add(1, Ordering::Relaxed) + 1, self.total, "frames");
+    }
+
+    pub(crate) fn clear(&self) {
+        self.bar.clear();
+    }
+}
+
+/// The elapsed time of work without steps, on a terminal only.
+#[derive(Debug)]
+pub(crate) struct Spinner(ProgressBar);
+
+impl Spinner {
+    pub(crate) fn start(what: &'static str) -> Self {
+        let target =
+            if io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed} elapsed");
+        let bar = ProgressBar::with_draw_target(None, target).with_message(what);
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
+        bar.enable_steady_tick(Duration::from_millis(200));
+        Self(bar)
+    }
+}
+
+impl Drop for Spinner {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
+fn bar_style(before: &str, after: &str) -> ProgressStyle {
     let template = format!("{before} [{{bar:30}}] {{pos}} of {{len}} {after}");
     ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> ")
 }
 
-/// A line about the last step, if one is due.
-fn line(bar: &ProgressBar, what: &str) {
-    let (done, all) = (bar.position(), bar.length().unwrap_or_default());
-    if is_told(done, all) {
-        let left = if done < all { format!(", about {} left", duration(bar.eta().as_secs())) } else { String::new() };
-        let _ = writeln!(io::stderr().lock(), "{what} ({done} of {all}{left})");
+/// Prints a line about the last step, if one is due.
+fn print_line(bar: &ProgressBar, what: &str) {
+    let (done, total) = (bar.position(), bar.length().unwrap_or_default());
+    if is_line_due(done, total) {
+        let left =
+            if done < total { format!(", about {} left", duration(bar.eta().as_secs_f64())) } else { String::new() };
+        let _ = writeln!(io::stderr().lock(), "{} ({done} of {total}{left})", escaped(what));
     }
 }
 
-/// Whether a line is due: at most [`MOST_LINES`] in all, and the last frame always.
-fn is_told(done: u64, of: u64) -> bool {
-    let due = |done: u64| u128::from(done) * u128::from(MOST_LINES) / u128::from(of.max(1));
-    of <= MOST_LINES || due(done) > due(done.saturating_sub(1))
+/// Whether a line is due: about [`MAX_LINES`] in all, and always the first and the last.
+fn is_line_due(done: u64, total: u64) -> bool {
+    let due = |done: u64| u128::from(done) * u128::from(MAX_LINES) / u128::from(total.max(1));
+    total <= MAX_LINES || done == 1 || due(done) > due(done.saturating_sub(1))
 }
 
-/// An object on a line of standard output.
-pub(crate) fn event(value: &serde_json::Value) -> Result<(), Failure> {
+/// Prints an object on a line of standard output.
+pub(crate) fn event(value: &serde_json::Value) -> Result<(), ExitError> {
     exit::print(&format!("{value}\n"))
 }
 
-fn duration(seconds: u64) -> String {
+fn duration(seconds: f64) -> String {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
+    let seconds = seconds as u64;
     match (seconds / 3600, seconds / 60 % 60, seconds % 60) {
         (0, 0, s) => format!("{s} s"),
         (0, m, s) => format!("{m} min {s:02} s"),
@@ -194,18 +274,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_stay_few_and_the_last_frame_is_told() {
-        for of in [1, 7, 100, 101, 12_345, 1_000_000] {
-            let told = (1..=of).filter(|&done| is_told(done, of)).count();
-            assert!(told as u64 <= MOST_LINES && told as u64 >= MOST_LINES.min(of) / 2, "{of}: {told}");
-            assert!(is_told(of, of));
+    fn lines_stay_few_and_the_last_step_has_a_line() {
+        for total in [1, 7, 100, 101, 12_345, 1_000_000] {
+            let lines = (1..=total).filter(|&done| is_line_due(done, total)).count();
+            assert!(lines as u64 <= MAX_LINES + 1 && lines as u64 >= MAX_LINES.min(total) / 2, "{total}: {lines}");
+            assert!(is_line_due(total, total));
         }
     }
 
     #[test]
-    fn durations_are_readable() {
-        assert_eq!(duration(9), "9 s");
-        assert_eq!(duration(69), "1 min 09 s");
-        assert_eq!(duration(3600 * 30 + 61), "30 h 01 min");
+    fn durations_have_units() {
+        assert_eq!(duration(9.0), "9 s");
+        assert_eq!(duration(69.0), "1 min 09 s");
+        assert_eq!(duration(3600.0 * 30.0 + 61.0), "30 h 01 min");
     }
 }

@@ -1,77 +1,80 @@
-//! `papsynth rerender` and `papsynth convert`: a data set of another, under another microscope or in other formats.
+//! `papsynth rerender` and `papsynth convert`: a data set imaged again, or in other formats.
 
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
 use papsynth::recipe::Recipe;
-use papsynth_dataset::{Dataset, Layout, Outcome, Progress, images_of, truth_differs};
+use papsynth_dataset::{Dataset, Layout, Outcome, image_paths, truth_difference};
 use toml::Table;
 
 use crate::args::{Convert, EngineArgs, RecipeArgs, Rerender};
-use crate::exit::{self, Failure};
+use crate::exit::{self, ExitError};
+use crate::report::FrameCounter;
 use crate::setup::{Setup, run_of};
-use crate::words::{counted, runs};
+use crate::words::{frames_written, ranges};
 
-/// The sections of a recipe that say how a scene is imaged, not what lies in it.
+/// Sections of a recipe that change the images of a scene, but not its objects.
 const IMAGING: [&str; 6] = ["background", "camera", "focus", "light", "optics", "stain"];
 
-pub(crate) fn run(args: &Rerender) -> Result<(), Failure> {
+pub(crate) fn run(args: &Rerender) -> Result<(), ExitError> {
     let source = Dataset::open(&args.dir)?;
-    let frames: Vec<u64> = images_of(&source)?.into_keys().collect();
+    source.check_inputs()?;
+    let frames: Vec<u64> = image_paths(&source)?.into_keys().collect();
     let seed = source.identity().seed;
     let before = load(args, seed, false)?;
     let path = source.path().join("recipe.toml");
-    let recipe = std::fs::read_to_string(&path).map_err(|error| Failure::file("read", &path, &error))?;
+    let recipe = std::fs::read_to_string(&path).map_err(|error| ExitError::file("read", &path, &error))?;
     if before.recipe.recipe.to_toml() != recipe {
-        return Err(Failure::wrong(
-            format!("{}: this program reads its recipe otherwise", args.dir.display()),
-            "a data set is rendered again by the release that made it",
+        return Err(ExitError::with_help(
+            format!("{}: recipe.toml was written by another release of papsynth", args.dir.display()),
+            "use the release that wrote the data set",
         ));
     }
     let after = load(args, seed, true)?;
     let changed = changed_sections(&before.recipe.recipe, &after.recipe.recipe);
     if let Some(section) = changed.iter().find(|section| !IMAGING.contains(&section.as_str())) {
-        return Err(Failure::wrong(
-            format!("`{section}` says what lies in a scene; rerender changes how it is imaged"),
-            format!("it takes {}; for all else: papsynth generate", IMAGING.join(", ")),
+        return Err(ExitError::with_help(
+            format!("`{section}` changes the objects of a scene; rerender changes only how scenes are imaged"),
+            format!("rerender accepts {}; for other sections use papsynth generate", IMAGING.join(", ")),
         ));
     }
     let (layout, _) = args.layout.layout(0);
-    let stop = exit::watch()?;
-    let outcome = render(&after, seed, &runs(&frames), &layout, &args.out, stop)?;
-    if let Some(difference) = truth_differs(&args.dir, &args.out)? {
-        return Err(Failure::wrong(
-            format!("the truth is another: {difference}"),
-            "a finer grid (`optics.oversampling`) draws other masks; leave it as it was",
+    let stop = exit::stop_flag()?;
+    let outcome = render(&after, seed, &ranges(&frames), &layout, &args.out, args.quiet, stop)?;
+    if let Some(difference) = truth_difference(&args.dir, &args.out)? {
+        return Err(ExitError::with_help(
+            format!("the ground truth differs: {difference}"),
+            "`optics.oversampling` changes masks; keep its value",
         ));
     }
     if args.quiet {
         return Ok(());
     }
-    let (out, dir, Outcome { made, kept, .. }) = (args.out.display(), args.dir.display(), outcome);
-    exit::print(&format!("{out}: {made} frames made, {kept} were there; the truth is that of {dir}\n"))
+    let (out, dir, frames) = (args.out.display(), args.dir.display(), frames_written(outcome.written, outcome.present));
+    exit::print(&format!("{out}: {frames}; the ground truth equals that of {dir}\n"))
 }
 
 /// `papsynth convert`: a data set in other formats.
-pub(crate) fn convert(args: &Convert) -> Result<(), Failure> {
+pub(crate) fn convert(args: &Convert) -> Result<(), ExitError> {
     let layout = args.files.layout(args.format.clone());
-    let stop = exit::watch()?;
-    let report = |_: Progress| ();
-    let outcome = papsynth_dataset::convert(&args.dir, &args.out, &layout, stop, &report)?;
+    let stop = exit::stop_flag()?;
+    let total = Dataset::open(&args.dir)?.frame_locations()?.len() as u64;
+    let counter = FrameCounter::start(args.quiet, total);
+    let outcome = papsynth_dataset::convert(&args.dir, &args.out, &layout, stop, &|_| counter.step());
+    counter.clear();
+    let outcome = outcome?;
     let out = args.out.display();
     if outcome.stopped {
-        let message = format!("stopped; every file in {out} is whole");
-        return Err(Failure::stopped(message, "write"));
+        return Err(ExitError::stopped(format!("stopped; every file in {out} is complete")));
     }
     if args.quiet {
         return Ok(());
     }
-    let there = if outcome.kept > 0 { format!(", {} were there", outcome.kept) } else { String::new() };
-    exit::print(&format!("{out}: {} written{there}\n", counted(outcome.made, "frame", "frames")))
+    exit::print(&format!("{out}: {}\n", frames_written(outcome.written, outcome.present)))
 }
 
-/// The engine of the data set's recipe, with what is set over it or without.
-fn load(args: &Rerender, seed: u64, changed: bool) -> Result<Setup, Failure> {
+/// The engine of the data set's recipe; with the options of the command line if `changed`.
+fn load(args: &Rerender, seed: u64, changed: bool) -> Result<Setup, ExitError> {
     let engine = EngineArgs {
         recipe: RecipeArgs {
             recipe: Some(args.dir.join("recipe.toml")),
@@ -94,27 +97,30 @@ fn changed_sections(before: &Recipe, after: &Recipe) -> Vec<String> {
     names.into_iter().filter(|name| before.get(*name) != after.get(*name)).cloned().collect()
 }
 
-/// Makes frames that need not follow each other.
+/// Generates ranges of frames.
 pub(crate) fn render(
     setup: &Setup,
     seed: u64,
     frames: &[Range<u64>],
     layout: &Layout,
     out: &std::path::Path,
+    quiet: bool,
     stop: &AtomicBool,
-) -> Result<Outcome, Failure> {
+) -> Result<Outcome, ExitError> {
     let dataset = Dataset::create_or_resume(out, &setup.info(seed, layout))?;
-    let mut sum = Outcome { kept: 0, made: 0, stopped: false };
+    let mut sum = Outcome { present: 0, written: 0, stopped: false };
+    let counter = FrameCounter::start(quiet, frames.iter().map(|range| range.end - range.start).sum());
     for frames in frames {
         let run = run_of(frames.clone(), setup.threads, stop);
-        let outcome = dataset.generate(&setup.engine, &run, &|_| ()).map_err(|error| setup.failure(error))?;
-        sum.kept += outcome.kept;
-        sum.made += outcome.made;
+        let outcome = dataset.generate(&setup.engine, &run, &|_| counter.step());
+        let outcome = outcome.map_err(|error| setup.error(error))?;
+        sum.present += outcome.present;
+        sum.written += outcome.written;
         if outcome.stopped {
-            let message = format!("stopped; every file in {} is whole", out.display());
-            return Err(Failure::stopped(message, "make"));
+            return Err(ExitError::stopped(format!("stopped; every file in {} is complete", out.display())));
         }
     }
+    counter.clear();
     dataset.finish()?;
     Ok(sum)
 }

@@ -1,39 +1,39 @@
-//! `papsynth status`, `merge`, `verify` and `clean`: how much is there, the end of the work of several, whether a data set is
-//! whole, and what does not belong there.
+//! `papsynth status`, `merge`, `verify` and `clean`: progress, merge, checks and cleaning of a data set.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use papsynth_dataset::{Check, Dataset, Home, shards_to_make};
+use papsynth_dataset::{Check, Dataset, Location, VerifyProgress, missing_shards};
 
 use crate::args::{Clean, Merge, Status, Verify, check_of};
-use crate::exit::{self, Failure};
-use crate::findings::{judge, print_findings};
-use crate::words::{counted, runs};
+use crate::exit::{self, ExitError};
+use crate::findings::{check, print_findings};
+use crate::report::Bar;
+use crate::words::{counted, ranges};
 
-pub(crate) fn run(args: &Status) -> Result<(), Failure> {
+pub(crate) fn run(args: &Status) -> Result<(), ExitError> {
     #[cfg(feature = "zarr")]
     if papsynth_dataset::slide::SlideSet::is_in(&args.dir) {
-        let (missing, shards, is_closed) = crate::slide::there(&args.dir)?;
-        let close = (!is_closed).then(|| format!("papsynth slide finalize {}", args.dir.display()));
-        return tell(args, &runs(&missing), shards, close.as_deref());
+        let (missing, shards, is_finished) = crate::slide::progress_of(&args.dir)?;
+        let finish = (!is_finished).then(|| format!("papsynth slide finalize {}", args.dir.display()));
+        return print_status(args, &ranges(&missing), shards, finish.as_deref());
     }
-    let dataset = Dataset::open(&Home::at(&args.dir)?)?;
+    let dataset = Dataset::open(&Location::at(&args.dir)?)?;
     let merged = dataset.merged_frames()?;
     let Some(frames) = args.frames.or((merged > 0).then_some(merged)) else {
-        return Err(Failure::wrong(
-            "--frames is missing: how many frames there will be".to_owned(),
-            "only a slide, or a data set that was merged, knows it by itself",
+        return Err(ExitError::with_help(
+            "--frames is missing".to_owned(),
+            "give the number of frames of the complete data set; slides and merged data sets record it",
         ));
     };
-    let missing = shards_to_make(&dataset, 0..frames, Check::Sizes)?;
+    let missing = missing_shards(&dataset, 0..frames, Check::Sizes)?;
     let all = frames.div_ceil(dataset.layout().frames_per_shard);
-    let close = format!("papsynth merge {} --frames {frames}", args.dir.display());
-    tell(args, &missing, all, (!dataset.is_finished()?).then_some(&close))
+    let finish = format!("papsynth merge {} --frames {frames}", args.dir.display());
+    print_status(args, &missing, all, (!dataset.is_finished()?).then_some(&finish))
 }
 
-/// What of so many shards is missing, and how to go on if nothing is, unless that was done.
-fn tell(args: &Status, missing: &[Range<u64>], all: u64, close: Option<&str>) -> Result<(), Failure> {
+/// Prints the missing ones of `all` shards; if none is missing, the command that finishes the data set.
+fn print_status(args: &Status, missing: &[Range<u64>], all: u64, finish: Option<&str>) -> Result<(), ExitError> {
     if args.missing {
         let text = match args.tasks {
             Some(tasks) => listed(&of_tasks(missing, tasks)),
@@ -41,30 +41,35 @@ fn tell(args: &Status, missing: &[Range<u64>], all: u64, close: Option<&str>) ->
         };
         return exit::print(&if text.is_empty() { text } else { format!("{text}\n") });
     }
-    let whole = all - count(missing);
-    let percent = 100.0 * whole as f64 / all as f64;
-    exit::print(&format!("{}: {whole} of {all} shards are whole ({percent:.1} %)\n", args.dir.display()))?;
-    match close {
-        _ if !missing.is_empty() => exit::print(&format!("missing: {}\n", listed(missing))),
-        Some(close) => exit::print(&format!("Close it with: {close}\n")),
-        None => exit::print("it is closed\n"),
+    let present = all - count(missing);
+    let percent = 100.0 * present as f64 / all as f64;
+    let shards = counted(all, "shard", "shards");
+    exit::print(&format!("{}: {present} of {shards} present ({percent:.1} %)\n", args.dir.display()))?;
+    match finish {
+        _ if !missing.is_empty() => exit::print(&format!("missing shards: {}\n", listed(missing))),
+        Some(finish) => exit::print(&format!("To finish it, run: {finish}\n")),
+        None => exit::print("finished\n"),
     }
 }
 
-pub(crate) fn merge(args: &Merge) -> Result<(), Failure> {
-    let dataset = Dataset::open(&Home::at(&args.dir)?)?;
-    let missing = shards_to_make(&dataset, 0..args.frames, check_of(args.verify))?;
+pub(crate) fn merge(args: &Merge) -> Result<(), ExitError> {
+    let dataset = Dataset::open(&Location::at(&args.dir)?)?;
+    let missing = missing_shards(&dataset, 0..args.frames, check_of(args.verify))?;
     let dir = args.dir.display();
     if !missing.is_empty() {
         let shards = counted(count(&missing), "shard is", "shards are");
         let message = format!("{dir}: {shards} missing or damaged: {}", listed(&missing));
-        let help = "the command that makes the data set, with --verify, makes them, in any share; then merge again";
-        return Err(Failure::wrong(message, help));
+        let help = "run the command that writes the data set with --verify, then merge again";
+        return Err(ExitError::with_help(message, help));
     }
     let summary = dataset.finish()?;
     if summary.frames != args.frames {
-        let message = format!("{dir}: --frames {}, but {} are there", args.frames, summary.frames);
-        return Err(Failure::wrong(message, "give the number that was meant, or take away what is too much"));
+        let found = counted(summary.frames, "frame", "frames");
+        let message = format!("{dir}: found {found}; --frames is {}", args.frames);
+        return Err(ExitError::with_help(
+            message,
+            "give the number of frames that were written, or remove other frames",
+        ));
     }
     let (frames, root) = (counted(summary.frames, "frame", "frames"), summary.root);
     exit::print(&format!("{dir}: {frames}\nroot {root}\nLook at: {dir}/contact-sheet.png\n"))
@@ -74,15 +79,15 @@ fn count(ranges: &[Range<u64>]) -> u64 {
     ranges.iter().map(|range| range.end - range.start).sum()
 }
 
-/// The tasks, of so many, that make these shards.
+/// The tasks, of `tasks` tasks, that write these shards.
 fn of_tasks(shards: &[Range<u64>], tasks: u64) -> Vec<Range<u64>> {
     let of_range =
         |range: &Range<u64>| (range.start..range.end.min(range.start.saturating_add(tasks))).map(|n| n % tasks);
     let numbers: BTreeSet<u64> = shards.iter().flat_map(of_range).collect();
-    runs(&Vec::from_iter(numbers))
+    ranges(&Vec::from_iter(numbers))
 }
 
-/// Numbers as `sbatch --array` takes them.
+/// Numbers and ranges in the syntax of `sbatch --array`.
 fn listed(ranges: &[Range<u64>]) -> String {
     let text = ranges
         .iter()
@@ -90,33 +95,38 @@ fn listed(ranges: &[Range<u64>]) -> String {
     text.collect::<Vec<_>>().join(",")
 }
 
-pub(crate) fn verify(args: &Verify) -> Result<(), Failure> {
+pub(crate) fn verify(args: &Verify) -> Result<(), ExitError> {
     #[cfg(feature = "zarr")]
     if papsynth_dataset::slide::SlideSet::is_in(&args.dir) {
         return crate::slide::verify(&args.dir, args.json);
     }
-    let verdict = papsynth_dataset::verify(&Home::at(&args.dir)?, args.frames.map(|frames| 0..frames))?;
+    let (location, frames) = (Location::at(&args.dir)?, args.frames.map(|frames| 0..frames));
+    let bar = Bar::on_terminal();
+    let count = |progress: VerifyProgress| bar.update(progress.done, progress.total, "shards checked");
+    let report = papsynth_dataset::verify_with_progress(&location, frames, &count);
+    bar.clear();
+    let report = report?;
     let dir = args.dir.display();
     if args.json {
-        let text = serde_json::to_string_pretty(&verdict).unwrap_or_default();
+        let text = serde_json::to_string_pretty(&report).unwrap_or_default();
         exit::print(&format!("{text}\n"))?;
-    } else if let Some(root) = &verdict.root {
-        let (frames, files) = (counted(verdict.frames, "frame", "frames"), counted(verdict.files, "file", "files"));
-        exit::print(&format!("{dir}: whole, {frames} in {files}\nroot {root}\n"))?;
+    } else if let Some(root) = &report.root {
+        let (frames, files) = (counted(report.frames, "frame", "frames"), counted(report.files, "file", "files"));
+        exit::print(&format!("{dir}: no problems found, {frames} in {files}\nroot {root}\n"))?;
     } else {
-        print_findings(&verdict.findings)?;
+        print_findings(&report.findings)?;
     }
-    judge(&args.dir, &verdict.findings)
+    check(&args.dir, &report.findings)
 }
 
-pub(crate) fn clean(args: &Clean) -> Result<(), Failure> {
-    let cleaned = papsynth_dataset::clean(&Home::at(&args.dir)?, args.strays)?;
-    let (dir, strays) = (args.dir.display(), counted(cleaned.strays, "other", "others"));
-    let left = counted(cleaned.temporary, "file", "files");
-    exit::print(&format!("{dir}: {left} of killed runs and {strays} removed\n"))?;
-    if cleaned.stayed > 0 {
-        let stay = counted(cleaned.stayed, "file stays", "files stay");
-        exit::note(format!("{stay}: at work, another user's, or of a name that is no UTF-8"));
+pub(crate) fn clean(args: &Clean) -> Result<(), ExitError> {
+    let cleaned = papsynth_dataset::clean(&Location::at(&args.dir)?, args.untracked)?;
+    let (dir, untracked) = (args.dir.display(), counted(cleaned.untracked, "untracked file", "untracked files"));
+    let temporary = counted(cleaned.temporary, "temporary file", "temporary files");
+    exit::print(&format!("{dir}: removed {temporary} and {untracked}\n"))?;
+    if cleaned.skipped > 0 {
+        let files = counted(cleaned.skipped, "file was", "files were");
+        exit::note(format!("{files} not removed: in use, of another user, or with a name that is not UTF-8"));
     }
     Ok(())
 }
@@ -126,7 +136,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_listed_as_schedulers_take_them() {
+    fn numbers_are_listed_in_the_syntax_of_schedulers() {
         assert_eq!(listed(&[0..1, 2..5, 9..10]), "0,2-4,9");
         assert_eq!(listed(&[]), "");
         assert_eq!(listed(&of_tasks(&[0..1, 12..15, 19..20], 10)), "0,2-4,9");

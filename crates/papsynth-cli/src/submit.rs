@@ -1,25 +1,24 @@
-//! `papsynth submit`: the script that makes a data set on a cluster.
+//! `papsynth submit`: a script that generates a data set on a cluster.
 
 use std::path::Path;
 
-use clap::Parser;
-
-use crate::args::{Cli, Generate, Submit, Verb};
-use crate::exit::{self, Failure};
+use crate::args::{self, Cli, Generate, Submit, Verb};
+use crate::exit::{self, ExitError};
 use crate::setup::Setup;
+use crate::words::counted;
 
-pub(crate) fn run(args: &Submit) -> Result<(), Failure> {
-    // What the tasks would refuse is refused here.
+pub(crate) fn run(args: &Submit) -> Result<(), ExitError> {
+    // Reports errors of the tasks before they run.
     let words = ["papsynth", "generate"].into_iter().chain(args.arguments.iter().map(String::as_str));
-    let generate = match Cli::try_parse_from(words) {
+    let generate = match args::parse(words.map(Into::into)) {
         Ok(Cli { verb: Verb::Generate(generate) }) => generate,
-        Ok(_) => return Err(Failure::input("what follows `--` is not for `papsynth generate`")),
-        Err(error) => return Err(Failure::input(error)),
+        Ok(_) => return Err(ExitError::input("the words after `--` are not arguments of `papsynth generate`")),
+        Err(error) => return Err(ExitError::input(error)),
     };
-    if generate.share.shard.is_some() || generate.engine.threads.is_some() {
-        return Err(Failure::wrong(
-            "--shard and --threads are for the script to set",
-            "leave them out; --tasks and --threads before `--` say both",
+    if generate.task.task.is_some() || generate.engine.threads.is_some() {
+        return Err(ExitError::with_help(
+            "the script sets --task and --threads",
+            "remove them after `--`; give --tasks and --threads before `--`",
         ));
     }
     check_here(&generate)?;
@@ -27,18 +26,19 @@ pub(crate) fn run(args: &Submit) -> Result<(), Failure> {
     let (layout, _) = generate.layout.layout(frames);
     let shards = frames.div_ceil(layout.frames_per_shard);
     if args.tasks > shards {
-        return Err(Failure::wrong(
-            format!("{} tasks for {shards} shards; some would have nothing to do", args.tasks),
-            format!("at most {shards}, or fewer --frames-per-shard"),
+        return Err(ExitError::with_help(
+            format!("--tasks {}: there are only {}", args.tasks, counted(shards, "shard", "shards")),
+            "give fewer tasks, or fewer frames per shard with --frames-per-shard",
         ));
     }
     let script = match args.scheduler.as_str() {
         "slurm" => slurm(args),
         _ => {
             let out = &generate.out;
-            if !out.starts_with("/data") && !papsynth_dataset::Home::is_address(out) {
+            if !out.starts_with("/data") && !papsynth_dataset::Location::is_address(out) {
                 exit::note(format!(
-                    "{} lies in the pod and is lost with it; the volume is mounted at /data, and addresses of object stores need none",
+                    "{} is inside the pod and is deleted with it; write below /data, where the volume is mounted, or to an \
+                     object store",
                     out.display()
                 ));
             }
@@ -48,17 +48,17 @@ pub(crate) fn run(args: &Submit) -> Result<(), Failure> {
     exit::print(&script)
 }
 
-/// What can be told of the recipe on this machine: all of it where it is here.
-fn check_here(generate: &Generate) -> Result<(), Failure> {
+/// Checks the recipe, if it is on this machine.
+fn check_here(generate: &Generate) -> Result<(), ExitError> {
     match &generate.engine.recipe.recipe {
         Some(path) if !path.exists() => {
             if path == Path::new("generate") {
-                return Err(Failure::wrong(
-                    "`generate` after `--` would be taken for a recipe",
-                    "leave it out; what follows it is meant",
+                return Err(ExitError::with_help(
+                    "`generate` after `--` means a recipe file of this name",
+                    "give only the arguments of `papsynth generate`",
                 ));
             }
-            exit::note(format!("{} is not on this machine; the tasks must find it", path.display()));
+            exit::note(format!("{} is not on this machine; it must exist where the tasks run", path.display()));
             Ok(())
         }
         _ => Setup::load(&generate.engine, None).map(drop),
@@ -75,8 +75,8 @@ fn slurm(args: &Submit) -> String {
          #SBATCH --cpus-per-task={threads}\n\
          #SBATCH --requeue\n\
          #SBATCH --open-mode=append\n\
-         # A task that is killed or requeued goes on where it was. Exit code 74 (input/output) is worth another try.\n\
-         papsynth generate {arguments} --threads {threads} --shard auto/{tasks}\n\
+         # A killed or requeued task continues. Tasks with exit code 74 (input/output) are run again.\n\
+         papsynth generate {arguments} --threads {threads} --task auto/{tasks}\n\
          code=$?\n\
          if [ \"$code\" -eq 74 ] && [ \"${{SLURM_RESTART_COUNT:-0}}\" -lt 5 ]; then\n\
          \x20 scontrol requeue \"${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}\"\n\
@@ -90,9 +90,9 @@ fn slurm(args: &Submit) -> String {
 fn kubernetes(args: &Submit) -> String {
     let Submit { tasks, threads, .. } = args;
     let image = serde_json::Value::from(args.image.as_deref().unwrap_or_default());
-    let own = ["--threads".to_owned(), threads.to_string(), "--shard".to_owned(), format!("auto/{tasks}")];
+    let own = ["--threads".to_owned(), threads.to_string(), "--task".to_owned(), format!("auto/{tasks}")];
     let words = std::iter::once(&"generate".to_owned()).chain(&args.arguments).chain(&own).cloned().collect::<Vec<_>>();
-    // `$(NAME)` would be replaced by a variable of the environment.
+    // Kubernetes replaces `$(NAME)` by an environment variable.
     let words: Vec<String> = words.iter().map(|word| word.replace("$(", "$$(")).collect();
     let words = serde_json::Value::from(words);
     format!(
@@ -105,9 +105,9 @@ fn kubernetes(args: &Submit) -> String {
          \x20 completions: {tasks}\n\
          \x20 parallelism: {tasks}\n\
          \x20 backoffLimitPerIndex: 5\n\
-         \x20 podFailurePolicy:\n\
+         \x20 podExitErrorPolicy:\n\
          \x20   rules:\n\
-         \x20   # Usage, recipe or input: another try would fail as well.\n\
+         \x20   # Usage, recipe or input: the task would fail again.\n\
          \x20   - action: FailIndex\n\
          \x20     onExitCodes: {{ containerName: papsynth, operator: In, values: [2] }}\n\
          \x20   - action: Ignore\n\
@@ -127,7 +127,7 @@ fn kubernetes(args: &Submit) -> String {
     )
 }
 
-/// A word that a shell takes as it stands.
+/// A word, quoted for a shell.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+".contains(c);
     match !word.is_empty() && word.chars().all(plain) {
@@ -141,7 +141,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_survive_a_shell() {
+    fn words_are_quoted_for_a_shell() {
         assert_eq!(quoted("cells=3"), "cells=3");
         assert_eq!(quoted("it's { here }"), r"'it'\''s { here }'");
         assert_eq!(quoted(""), "''");

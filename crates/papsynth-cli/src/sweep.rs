@@ -1,57 +1,63 @@
-//! `papsynth sweep`: the same fields under every combination of some settings.
+//! `papsynth sweep`: the same fields under every combination of settings.
 
 use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
-use papsynth_dataset::{Dataset, images_of, write_file};
+use papsynth_dataset::{Dataset, image_paths, write_file};
 
 use crate::args::Sweep;
-use crate::exit::{self, Failure};
+use crate::exit::{self, ExitError};
+use crate::output_file::{Kind, OutputFile};
 use crate::rerender::render;
 use crate::setup::Setup;
-use crate::text_file;
 
-const MOST: usize = 10_000;
+const MAX_COMBINATIONS: usize = 10_000;
 
 const TABLE: &str = "sweep.csv";
 
+/// The beginning of every table.
+const TABLE_BEGINS: &[u8] = b"set,image,slide,file";
+
 const COLUMNS: [&str; 4] = ["set", "image", "slide", "file"];
 
+/// A field that is varied.
 struct Axis {
     field: String,
     values: Vec<String>,
 }
 
-pub(crate) fn run(args: &Sweep) -> Result<(), Failure> {
+pub(crate) fn run(args: &Sweep) -> Result<(), ExitError> {
     let axes = args.vary.iter().map(|text| axis(text)).collect::<Result<Vec<_>, _>>()?;
     for (number, axis) in axes.iter().enumerate() {
         if axes[..number].iter().any(|before| before.field == axis.field) {
-            return Err(Failure::wrong(
-                format!("--vary {}: it is varied already", axis.field),
-                "give all its values at once: --vary FIELD=A,B,…",
+            return Err(ExitError::with_help(
+                format!("--vary {}: given twice", axis.field),
+                "give all values of a field in one option: --vary FIELD=A,B,…",
             ));
         }
     }
     let count = axes.iter().try_fold(1_usize, |product, axis| product.checked_mul(axis.values.len()));
-    let Some(count) = count.filter(|count| *count <= MOST) else {
-        return Err(Failure::input(format!("more than {MOST} combinations; vary fewer at once")));
+    let Some(count) = count.filter(|count| *count <= MAX_COMBINATIONS) else {
+        return Err(ExitError::input(format!(
+            "more than {MAX_COMBINATIONS} combinations; vary fewer fields or values"
+        )));
     };
     let (layout, _) = args.layout.layout(args.frames);
-    // What one combination cannot be made of is told before any is made.
+    // Errors of any combination are reported before the first is generated.
     let combinations = combinations(&axes);
     let setups = combinations.iter().map(|values| setup(args, &axes, values)).collect::<Result<Vec<_>, _>>()?;
-    is_own(&args.out, count)?;
+    check_out(&args.out, count)?;
     let frames = 0..args.frames;
-    let stop = exit::watch()?;
+    let stop = exit::stop_flag()?;
     let mut table = csv::Writer::from_writer(Vec::new());
-    // Writing to memory cannot fail, and all lines are of one length.
+    // Writing to memory does not fail, and all records have the same length.
     let _ = table.write_record(COLUMNS.into_iter().chain(axes.iter().map(|axis| axis.field.as_str())));
     for (number, (setup, values)) in setups.iter().zip(&combinations).enumerate() {
         let name = set_name(number);
         let out = args.out.join(&name);
-        render(setup, args.engine.seed, std::slice::from_ref(&frames), &layout, &out, stop)?;
-        for (index, (slide, file)) in images_of(&Dataset::open(&out)?)? {
+        render(setup, args.engine.seed, std::slice::from_ref(&frames), &layout, &out, args.quiet, stop)?;
+        for (index, (slide, file)) in image_paths(&Dataset::open(&out)?)? {
             let fixed = [name.as_str(), &index.to_string(), &slide.to_string(), &file];
             let _ = table.write_record(fixed.into_iter().chain(values.iter().copied()));
         }
@@ -66,29 +72,29 @@ pub(crate) fn run(args: &Sweep) -> Result<(), Failure> {
     if args.quiet { Ok(()) } else { exit::print(&format!("Look at: {}\n", path.display())) }
 }
 
-/// Makes sure that a folder holds nothing but what a sweep of so many data sets writes there.
-fn is_own(out: &Path, count: usize) -> Result<(), Failure> {
+/// Checks that a folder holds only files of a sweep with `count` combinations.
+fn check_out(out: &Path, count: usize) -> Result<(), ExitError> {
     let refuse = |name: &str| {
-        let message = format!("{}: the folder holds something else (`{name}`) and no sweep", out.display());
-        Err(Failure::wrong(message, "choose another, or a new one"))
+        let message = format!("{}: the folder holds `{name}`, which is not part of this sweep", out.display());
+        Err(ExitError::with_help(message, "choose another or a new folder"))
     };
     let entries = match fs::read_dir(out) {
         Ok(entries) => entries,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
         Err(error) if error.kind() == ErrorKind::NotADirectory => {
-            return Err(Failure::input(format!("{}: is a file; a folder is wanted", out.display())));
+            return Err(ExitError::input(format!("{}: is a file; expected a folder", out.display())));
         }
-        Err(error) => return Err(Failure::file("read", out, &error)),
+        Err(error) => return Err(ExitError::file("read", out, &error)),
     };
     for entry in entries {
-        let entry = entry.map_err(|error| Failure::file("read", out, &error))?;
+        let entry = entry.map_err(|error| ExitError::file("read", out, &error))?;
         let name = entry.file_name().to_string_lossy().into_owned();
-        // Not followed: a link leads out of the folder.
-        let kind = entry.file_type().map_err(|error| Failure::file("read", &entry.path(), &error))?;
+        // Links are not followed, because they lead out of the folder.
+        let kind = entry.file_type().map_err(|error| ExitError::file("read", &entry.path(), &error))?;
         let number = name.parse().ok().filter(|number| *number < count && name == set_name(*number));
         let is_set = kind.is_dir() && number.is_some();
         if name == TABLE && kind.is_file() {
-            text_file::may_replace(&entry.path(), COLUMNS.join(",").as_bytes(), "the table of an older sweep")?;
+            OutputFile::check(&entry.path(), Kind::Text(TABLE_BEGINS, "the table of a sweep"), false)?;
         } else if !is_set && !name.starts_with('.') {
             return refuse(&name);
         }
@@ -100,20 +106,20 @@ fn set_name(number: usize) -> String {
     format!("{number:04}")
 }
 
-fn axis(text: &str) -> Result<Axis, Failure> {
-    let wrong = || Failure::input(format!("--vary {text}: expected FIELD=A,B,…"));
+fn axis(text: &str) -> Result<Axis, ExitError> {
+    let wrong = || ExitError::input(format!("--vary {text}: expected FIELD=A,B,…"));
     let (field, values) = text.split_once('=').ok_or_else(wrong)?;
     let values = parts(values);
     if field.trim().is_empty() || values.iter().any(String::is_empty) {
         return Err(wrong());
     }
     if let Some(twice) = values.iter().enumerate().find(|(number, value)| values[..*number].contains(value)) {
-        return Err(Failure::input(format!("--vary {text}: {} stands there twice", twice.1)));
+        return Err(ExitError::input(format!("--vary {text}: the value {} occurs twice", twice.1)));
     }
     Ok(Axis { field: field.trim().to_owned(), values })
 }
 
-/// What stands between commas, but those within brackets and quotes.
+/// Splits at commas outside brackets and quotes.
 fn parts(text: &str) -> Vec<String> {
     let (mut parts, mut depth, mut quote) = (vec![String::new()], 0_u32, None);
     for c in text.chars() {
@@ -135,7 +141,7 @@ fn parts(text: &str) -> Vec<String> {
     parts.iter().map(|part| part.trim().to_owned()).collect()
 }
 
-/// The values of every combination: the last axis changes first.
+/// All combinations of values; the last axis changes fastest.
 fn combinations(axes: &[Axis]) -> Vec<Vec<&str>> {
     let mut all = vec![Vec::new()];
     for axis in axes {
@@ -146,7 +152,7 @@ fn combinations(axes: &[Axis]) -> Vec<Vec<&str>> {
     all
 }
 
-fn setup(args: &Sweep, axes: &[Axis], values: &[&str]) -> Result<Setup, Failure> {
+fn setup(args: &Sweep, axes: &[Axis], values: &[&str]) -> Result<Setup, ExitError> {
     let mut engine = args.engine.clone();
     engine.recipe.set.extend(axes.iter().zip(values).map(|(axis, value)| format!("{}={value}", axis.field)));
     Setup::load(&engine, None)
@@ -157,7 +163,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_combination_comes_once() {
+    fn combinations_are_unique_and_complete() {
         let axes = [axis("a.b=1,2").unwrap(), axis("c = x, y ,z").unwrap()];
         let expected = [["1", "x"], ["1", "y"], ["1", "z"], ["2", "x"], ["2", "y"], ["2", "z"]];
         assert_eq!(combinations(&axes), expected);
@@ -165,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn commas_within_brackets_and_quotes_part_nothing() {
+    fn commas_inside_brackets_and_quotes_do_not_split() {
         assert_eq!(parts("1, 2,3"), ["1", "2", "3"]);
         assert_eq!(parts("{ uniform = [2, 6] },3"), ["{ uniform = [2, 6] }", "3"]);
         assert_eq!(parts("[1, [2, 3]],\"a, b\",']'"), ["[1, [2, 3]]", "\"a, b\"", "']'"]);

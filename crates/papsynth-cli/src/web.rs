@@ -1,4 +1,4 @@
-//! Pages on this machine.
+//! `papsynth view` and `papsynth study`: pages served on this machine.
 
 use std::process::{Command, Stdio};
 
@@ -6,38 +6,42 @@ use papsynth_study::{Group, Interval, Pool, Row, Session, Side, State, StudyPara
 use papsynth_web::{Error, Server, serve_study};
 
 use crate::args::{Study, View};
-use crate::exit::{self, Complaint, Failure};
+use crate::exit::{self, ErrorReport, ExitError};
 
-/// Opens a page with what the system opens pages with; if it cannot, the address stands above.
+/// Opens a page in the default browser.
 fn open(address: &str) {
     let (program, arguments): (&str, &[&str]) = match std::env::consts::OS {
         "macos" => ("open", &[]),
-        // The empty word is the title of a window.
+        // `start` takes the first quoted word as a window title.
         "windows" => ("cmd", &["/C", "start", ""]),
         _ => ("xdg-open", &[]),
     };
     let mut command = Command::new(program);
     command.args(arguments).arg(address).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     if let Err(error) = command.spawn() {
-        exit::note(format!("no browser could be opened: {error}"));
+        exit::note(format!("cannot open a browser: {error}"));
     }
 }
 
-/// `papsynth view`: a data set or a slide in the browser.
-pub(crate) fn view(args: &View) -> Result<(), Failure> {
-    let view = papsynth_web::View::open(&args.dir)?;
+/// `papsynth view`: shows a data set or a slide in the browser.
+pub(crate) fn view(args: &View) -> Result<(), ExitError> {
+    let view = papsynth_web::Viewer::open(&args.dir)?;
     let server = Server::bind(args.port.unwrap_or(0))?;
-    let stop = exit::watch()?;
+    let stop = exit::stop_flag()?;
     let address = server.address();
-    exit::print(&format!("{}: a {}\nOpen {address} in a browser. Ctrl-C ends.\n", args.dir.display(), view.kind()))?;
+    exit::print(&format!(
+        "{}: a {}\nOpen {address} in a browser. Press Ctrl-C to quit.\n",
+        args.dir.display(),
+        view.kind()
+    ))?;
     if args.open {
         open(&address);
     }
     Ok(server.run(view, stop, |_| ())?)
 }
 
-/// `papsynth study`: can people tell?
-pub(crate) fn study(args: &Study) -> Result<(), Failure> {
+/// `papsynth study`: a reader study with real and synthetic patches.
+pub(crate) fn study(args: &Study) -> Result<(), ExitError> {
     let (Some(real), Some(synthetic)) = (&args.real, &args.synthetic) else {
         return args.results.as_deref().map_or(Ok(()), |folder| pooled(folder, args.json));
     };
@@ -60,7 +64,7 @@ pub(crate) fn study(args: &Study) -> Result<(), Failure> {
         Some(port) => Server::bind(port)?,
         None => Server::bind_near(session.port())?,
     };
-    let stop = exit::watch()?;
+    let stop = exit::stop_flag()?;
     let folder = session.folder().display().to_string();
     session.notes().iter().for_each(exit::note);
     exit::print(&announcement(&session, &server))?;
@@ -70,15 +74,15 @@ pub(crate) fn study(args: &Study) -> Result<(), Failure> {
     let mut all_answered = session.is_finished();
     serve_study(server, session, stop, |session| {
         all_answered = true;
-        // Standard output may be closed: the page and the files hold the results too.
+        // Ignores a closed standard output, because the page and the files hold the results too.
         let results = results(&session.summary());
-        let _ = exit::print(&format!("\n{results}\nIn {folder}: trials.csv, summary.json. Ctrl-C ends.\n"));
+        let _ = exit::print(&format!("\n{results}\nIn {folder}: trials.csv, summary.json. Press Ctrl-C to quit.\n"));
     })?;
     if all_answered {
         return Ok(());
     }
-    let message = format!("stopped before the last answer; every answer so far is in {folder}");
-    Err(Failure::interrupted(Complaint::new(message).help("run the same command again to go on")))
+    let message = format!("stopped before the last answer; all answers so far are in {folder}");
+    Err(ExitError::interrupted(ErrorReport::new(message).help("run the same command again to continue")))
 }
 
 fn announcement(session: &Session, server: &Server) -> String {
@@ -90,26 +94,26 @@ fn announcement(session: &Session, server: &Server) -> String {
     };
     let (State { training, trials, .. }, address) = (state, server.address());
     format!(
-        "{training} trials for practice and {trials} that count{done}; {real} real and {synthetic} synthetic fields\n\
-         Open {address} in a browser. Ctrl-C ends; the same command goes on.\n"
+        "{training} practice trials and {trials} scored trials{done}; {real} real and {synthetic} synthetic fields\n\
+         Open {address} in a browser. Press Ctrl-C to quit; run the same command again to continue.\n"
     )
 }
 
 fn results(summary: &Summary) -> String {
-    told([&summary.row, &summary.random], summary.claim.trials, "", &summary.breakdown)
+    tables([&summary.row, &summary.random], summary.claim.trials, "", &summary.breakdown)
 }
 
-fn told<'a>(rows: impl IntoIterator<Item = &'a Row>, trials: u64, means: &str, breakdown: &[Group]) -> String {
+fn tables<'a>(rows: impl IntoIterator<Item = &'a Row>, trials: u64, means: &str, breakdown: &[Group]) -> String {
     let breakdown = breakdown_table(breakdown);
-    let by = if breakdown.is_empty() { String::new() } else { format!("\nright answers by parameter\n{breakdown}") };
+    let by = if breakdown.is_empty() { String::new() } else { format!("\ncorrect answers by parameter\n{breakdown}") };
     format!(
-        "{}Intervals of 95 % (Wilson); d′ and c with the log-linear correction. A claim of ±5 points takes {trials} trials.\n\
+        "{}95 % intervals (Wilson); d′ and c with the log-linear correction. A margin of ±5 points needs {trials} trials.\n\
          {means}{by}",
         table(rows)
     )
 }
 
-fn pooled(folder: &std::path::Path, as_json: bool) -> Result<(), Failure> {
+fn pooled(folder: &std::path::Path, as_json: bool) -> Result<(), ExitError> {
     let pool = Pool::read(folder).map_err(Error::from)?;
     if as_json {
         return exit::print(&format!("{}\n", serde_json::to_string_pretty(&pool).unwrap_or_default()));
@@ -128,10 +132,10 @@ fn pooled(folder: &std::path::Path, as_json: bool) -> Result<(), Failure> {
             Some(format!("{name} {mean:.3} ({low:.3} to {high:.3})"))
         })
         .collect();
-    // The interval over subjects tells of other subjects, Wilson's of other patches for the same ones.
+    // The interval over subjects holds for new subjects, that of Wilson for new patches and the same subjects.
     let means = match means.is_empty() {
         true => String::new(),
-        false => format!("Means over subjects, with intervals of 95 % by Student's t: {}.\n", means.join(", ")),
+        false => format!("Means over subjects with 95 % intervals (Student's t): {}.\n", means.join(", ")),
     };
-    exit::print(&told(rows, pool.claim.trials, &means, &pool.breakdown))
+    exit::print(&tables(rows, pool.claim.trials, &means, &pool.breakdown))
 }

@@ -9,7 +9,7 @@ use papsynth::model::Model;
 use papsynth::recipe::Preset;
 use papsynth::{Engine, Inputs, Threads};
 use papsynth_dataset::slide::{SlideInfo, SlideRun, SlideSet};
-use papsynth_dataset::{Check, Share};
+use papsynth_dataset::{Check, Task};
 
 const SIDE_PX: u32 = 2048;
 
@@ -35,8 +35,8 @@ fn shard(c: &mut Criterion) {
             let info = SlideInfo { recipe: &recipe, model: &model, seed: 1, shard_px: SIDE_PX, objects_parquet: false };
             let set = SlideSet::create_or_resume(&folder, &slide, &info).expect("a folder");
             let stop = AtomicBool::new(false);
-            let run = SlideRun { share: Share::ALL, threads: Threads::One, check: Check::Sizes, stop: &stop };
-            set.make(&slide, &run, &|_| ()).expect("a shard")
+            let run = SlideRun { task: Task::ALL, threads: Threads::One, check: Check::Sizes, stop: &stop };
+            set.generate(&slide, &run, &|_| ()).expect("a shard")
         });
     });
     group.finish();

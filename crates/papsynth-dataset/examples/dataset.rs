@@ -9,7 +9,7 @@ use std::sync::atomic::AtomicBool;
 use papsynth::model::Model;
 use papsynth::recipe::Preset;
 use papsynth::{Engine, Inputs, Threads};
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Format, Layout, Run, Share};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Format, Layout, Run, Task};
 
 fn main() -> Result<(), Error> {
     let mut arguments = std::env::args().skip(1);
@@ -28,10 +28,10 @@ fn main() -> Result<(), Error> {
     let info = DatasetInfo { recipe: &recipe, model: &model, seed: 1, map: None, layout: &layout };
     let dataset = Dataset::create_or_resume(&folder, &info)?;
     let stop = AtomicBool::new(false);
-    let (share, threads, check) = (Share::ALL, Threads::One, Check::Sizes);
+    let (task, threads, check) = (Task::ALL, Threads::One, Check::Sizes);
     dataset.generate(
         &engine,
-        &Run { frames: 0..1, share, at_once: 1, threads, check, stop: &stop, profile: None },
+        &Run { frames: 0..1, task, workers: 1, threads, check, stop: &stop, profile: None },
         &|_| (),
     )?;
     dataset.finish()?;

@@ -1,4 +1,4 @@
-//! Bytes of values, and SHA-256.
+//! JSON serialization and SHA-256.
 
 use std::fs::File;
 use std::io::{self, BufReader};
@@ -6,23 +6,22 @@ use std::io::{self, BufReader};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-/// How much is read at a time to be hashed.
+/// Bytes that are read at a time for hashing.
 const HASH_BLOCK: usize = 1 << 16;
 
-/// Why serialisation cannot fail here.
-const HAS_JSON: &str = "structs whose maps have text keys have a JSON form";
+const HAS_JSON: &str = "structs with string keys serialize to JSON";
 
-/// A value as compact JSON.
+/// Returns a value as compact JSON.
 pub(crate) fn json(value: &impl Serialize) -> Vec<u8> {
     serde_json::to_vec(value).expect(HAS_JSON)
 }
 
-/// A value as JSON with a field a line.
+/// Returns a value as JSON with one field per line.
 pub(crate) fn json_lines(value: &impl Serialize) -> Vec<u8> {
     serde_json::to_vec_pretty(value).expect(HAS_JSON)
 }
 
-/// Size and SHA-256 of the rest of a file.
+/// Returns size and SHA-256 of the rest of a file.
 pub(crate) fn measure(file: &mut File) -> io::Result<(u64, String)> {
     let mut hash = Sha256::new();
     let bytes = io::copy(&mut BufReader::with_capacity(HASH_BLOCK, file), &mut hash)?;

@@ -1,4 +1,4 @@
-//! What lies in a data set or slide and does not belong there.
+//! Removal of files that do not belong to a data set or slide.
 
 use std::collections::BTreeSet;
 
@@ -6,61 +6,64 @@ use serde::Serialize;
 
 use crate::dataset::{Manifest, nested_below, read_record, recorded_shards};
 use crate::error::Error;
-use crate::files::{Folder, Home, is_temporary};
+use crate::files::{Folder, Location, is_temporary, last_part};
 use crate::formats::names;
 #[cfg(feature = "zarr")]
 use crate::slide::SlideSet;
 
-/// What [`clean`] took away.
+/// Counts of the files that [`clean`] removed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Cleaned {
-    /// Files that runs which were killed left behind.
+    /// Temporary files of killed runs.
     pub temporary: u64,
-    /// Other files that are none of the data set's.
-    pub strays: u64,
-    /// Files of both kinds that stay: somebody works on them, they are another user's, or their names are no UTF-8.
-    pub stayed: u64,
+    /// Untracked files: other files that do not belong to the data set.
+    pub untracked: u64,
+    /// Files of both kinds that were not removed: another process writes them, another user owns them, or their names
+    /// are not UTF-8.
+    pub skipped: u64,
 }
 
-/// Removes from a data set or a slide what killed runs left behind and, if wanted, everything else that is none of its files, with
-/// the folders that are empty then.
+/// Removes temporary files of killed runs from a data set or slide. With `untracked`, also removes every other file
+/// that does not belong to it, and the folders that are then empty. Files of the desktop, such as `.DS_Store`, are
+/// ignored.
 ///
 /// # Errors
-/// If there is neither, strays cannot be told (a record cannot be read, or the work of all shards is not closed yet, so that others may be
-/// at it), or the system refuses.
-pub fn clean(home: impl Into<Home>, strays: bool) -> Result<Cleaned, Error> {
-    let folder = Folder::new(home);
-    clean_in(&folder, strays).map_err(|error| folder.named(error))
+/// If there is no data set or slide, a file cannot be removed, or untracked files are unknown: a record cannot be read,
+/// or the data set is not merged and other processes may still write.
+pub fn clean(location: impl Into<Location>, untracked: bool) -> Result<Cleaned, Error> {
+    let folder = Folder::new(location);
+    clean_in(&folder, untracked).map_err(|error| folder.named(error))
 }
 
-fn clean_in(folder: &Folder, strays: bool) -> Result<Cleaned, Error> {
+fn clean_in(folder: &Folder, untracked: bool) -> Result<Cleaned, Error> {
     let owner = Owner::of(folder)?;
-    let [temporary, stayed] = folder.sweep()?;
-    let mut cleaned = Cleaned { temporary, strays: 0, stayed };
-    if !strays {
+    let [temporary, skipped] = folder.sweep()?;
+    let mut cleaned = Cleaned { temporary, untracked: 0, skipped };
+    if !untracked {
         return Ok(cleaned);
     }
     let own = owner.names(folder)?;
     let mut found = folder.names()?;
-    // A temporary file that is still there is somebody's work.
-    found.retain(|name| !own.contains(name) && !is_temporary(name.rsplit('/').next().unwrap_or(name)));
+    // Another process still writes a temporary file that is left.
+    found.retain(|name| !own.contains(name) && !is_temporary(last_part(name)));
     if let Some(inner) = nested_below(folder, &found) {
-        let message = format!("{} lies within and has files of its own; move it elsewhere first", inner.display());
+        let message = format!("contains another data set or slide in {}; move it elsewhere first", inner.display());
         return Err(Error::folder(folder.root(), message));
     }
     for name in found {
         if folder.is_remote() || folder.path(&name).symlink_metadata().is_ok() {
             folder.remove(&name)?;
-            cleaned.strays += 1;
+            cleaned.untracked += 1;
         } else {
-            cleaned.stayed += 1;
+            cleaned.skipped += 1;
         }
     }
-    // One may stand where a file belongs.
+    // An empty folder may have the name of a file of the data set.
     folder.remove_empty()?;
     Ok(cleaned)
 }
 
+/// The kind of output in a folder.
 enum Owner {
     Dataset(Manifest),
     #[cfg(feature = "zarr")]
@@ -68,7 +71,10 @@ enum Owner {
 }
 
 impl Owner {
-    /// Of a folder that is none of ours there is no owner, which is an error.
+    /// Returns the data set or slide in a folder.
+    ///
+    /// # Errors
+    /// If there is none.
     fn of(folder: &Folder) -> Result<Self, Error> {
         #[cfg(feature = "zarr")]
         if !folder.is_remote() && SlideSet::is_in(folder.root()) {
@@ -77,7 +83,10 @@ impl Owner {
         Manifest::read(folder).map(Self::Dataset)
     }
 
-    /// The names of all its files, once its work is closed.
+    /// Returns the names of all its files.
+    ///
+    /// # Errors
+    /// If it is not merged.
     fn names(&self, folder: &Folder) -> Result<BTreeSet<String>, Error> {
         let manifest = match self {
             Self::Dataset(manifest) => manifest,
@@ -86,8 +95,7 @@ impl Owner {
         };
         let shards = recorded_shards(folder)?;
         if shards.is_empty() || manifest.shards != shards.len() as u64 {
-            let message =
-                "what others are writing cannot be told from strays before `papsynth merge` has closed the data set";
+            let message = "untracked files can be removed only after `papsynth merge`";
             return Err(Error::folder(folder.root(), message));
         }
         let mut names: BTreeSet<String> = manifest.files.iter().map(|file| file.path.clone()).collect();

@@ -1,61 +1,61 @@
-//! What can go wrong, and whether trying again can help.
+//! Errors of reading and writing files.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Why files cannot be read or written.
+/// An error of reading or writing files.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A file given by the user cannot be used.
+    /// The content of a file is invalid.
     #[error("{}: {problem}", path.display())]
     Input {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The defect.
         problem: Problem,
     },
-    /// The system refused to read or write.
+    /// An operation on a file failed.
     #[error("cannot {action} {}: {source}", path.display())]
     Io {
-        /// What was tried: "read", "write", ….
+        /// The operation: "read", "write", …
         action: &'static str,
         /// The file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// The folder of a data set cannot be used.
     #[error("{}: {message}", path.display())]
     Folder {
-        /// The folder, or the file in it that stands in the way.
+        /// The folder, or the file in it that causes the error.
         path: PathBuf,
-        /// What is wrong, and what would help.
+        /// The defect and its remedy.
         message: String,
     },
-    /// What was handed over to be written does not fit together.
+    /// The data given for a frame is inconsistent.
     #[error("frame {index}: {message}")]
     Frame {
         /// Index of the frame.
         index: u64,
-        /// What does not fit.
+        /// The inconsistency.
         message: String,
     },
-    /// The engine cannot make a frame.
+    /// The engine cannot generate a frame.
     #[error(transparent)]
     Engine(#[from] papsynth::Error),
 }
 
 impl Error {
-    /// Whether the system failed (full disk, no permission), so that trying again may help; everything else lies in
-    /// what was asked for, such as a name that is too long or that a folder has already.
+    /// Whether the system failed (full disk, no permission), so that a retry may succeed. All other errors are in the
+    /// input, for example a file name that is too long.
     #[must_use]
     pub fn is_io(&self) -> bool {
         use io::ErrorKind::{AlreadyExists, InvalidFilename, InvalidInput, IsADirectory, NotADirectory};
-        let is_asked_for = |source: &io::Error| {
+        let is_input = |source: &io::Error| {
             matches!(source.kind(), AlreadyExists | InvalidFilename | InvalidInput | IsADirectory | NotADirectory)
         };
-        matches!(self, Self::Io { source, .. } if !is_asked_for(source))
+        matches!(self, Self::Io { source, .. } if !is_input(source))
     }
 
     pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
@@ -70,63 +70,66 @@ impl Error {
         Self::Folder { path: path.to_owned(), message: message.into() }
     }
 
-    /// What to say of a path that needs a feature which this build lacks.
+    /// An error for a path that needs a feature which this build lacks.
     pub(crate) fn missing_feature(what: &str, feature: &str, path: &Path) -> Self {
         Self::folder(path, format!("{what} needs a build of papsynth with `--features {feature}`"))
     }
 }
 
-/// What is wrong with a file that was read.
+/// A defect of a file that was read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Problem {
-    /// There is no such "file" or "folder".
+    /// The "file" or "folder" does not exist.
     #[error("there is no such {0}")]
     Missing(&'static str),
-    /// There is a folder of that name.
-    #[error("is a folder; a file is expected")]
+    /// The path is a folder.
+    #[error("expected a file, found a folder")]
     Folder,
-    /// The file, or a folder on the way to it, is a link.
-    #[error("is or lies behind a symbolic link; links in a data set are not followed")]
+    /// The file, or a folder in its path, is a symbolic link.
+    #[error("the path contains a symbolic link; links in a data set are not followed")]
     Link,
+    /// The path is a pipe, device or socket.
+    #[error("is a pipe, device or socket; expected a regular file")]
+    NotAFile,
     /// The file is of another format.
-    #[error("is neither a PNG nor a TIFF file")]
+    #[error("is not a PNG, JPEG or TIFF file")]
     Format,
-    /// The "PNG" or "TIFF" file ends before its image does.
-    #[error("the {0} file is truncated: it ends before its image does")]
+    /// The "PNG", "JPEG" or "TIFF" file is truncated.
+    #[error("the {0} file is truncated")]
     Truncated(&'static str),
     /// The file does not follow its format.
     #[error("the {format} file cannot be decoded: {message}")]
     Broken {
         /// "PNG", "TIFF", "CSV", ….
         format: &'static str,
-        /// What the decoder said.
+        /// The message of the decoder.
         message: String,
     },
-    /// The file is larger than it may be.
-    #[error("the file has {bytes} bytes; at most {limit} are read")]
+    /// The file is too large.
+    #[error("the file has {bytes} bytes; the maximum is {limit}")]
     FileSize {
         /// Its size.
         bytes: u64,
         /// The limit.
         limit: u64,
     },
-    /// The image is larger than it may be, or has no pixel.
+    /// The image is empty or too large.
     #[error(
-        "the image is {width} x {height}; accepted are 1 to {max_side} pixels a side and at most {max_pixels} in all"
+        "the image is {width} x {height} pixels; expected 1 to {max_side} in each direction and at most {max_pixels} in total"
     )]
     ImageSize {
         /// Columns.
         width: u64,
         /// Rows.
         height: u64,
-        /// Limit of either.
+        /// Largest width and height.
         max_side: u64,
-        /// Limit of their product.
+        /// Largest number of pixels.
         max_pixels: u64,
     },
-    /// A pixel has a colour, or a transparency.
-    #[error("the pixel at ({x}, {y}) is {what}; accepted are grey and opaque pixels")]
+    /// A pixel is coloured or transparent.
+    #[error("the pixel at ({x}, {y}) is {what}; expected grey and opaque pixels")]
     NotGrey {
         /// "coloured" or "transparent".
         what: &'static str,
@@ -135,27 +138,27 @@ pub enum Problem {
         /// Row.
         y: usize,
     },
-    /// The samples are of a type that has no meaning here.
-    #[error("has {found}; accepted are {accepted}")]
+    /// The type of the samples is not supported.
+    #[error("has {found}; expected {accepted}")]
     Samples {
         /// The type in the file.
         found: String,
-        /// The types that can be read.
+        /// The supported types.
         accepted: &'static str,
     },
-    /// What is in the file does not fit: an empty mask, a mask of another size than its image, a file of a data set that says
-    /// something else than the others. The text says what is wrong, and what would be accepted.
+    /// The content is invalid or contradicts other files: an empty mask, a mask whose size differs from its image. The
+    /// text states the defect and what is accepted.
     #[error("{0}")]
     Unfit(String),
-    /// A folder without anything to read.
-    #[error("holds no PNG or TIFF file")]
+    /// A folder without images.
+    #[error("contains no PNG, JPEG or TIFF file")]
     NoImages,
-    /// A line of a table.
+    /// A line of a table is invalid.
     #[error("line {line}: {message}")]
     Row {
         /// Number of the line, from 1.
         line: u64,
-        /// What is wrong with it, and what would be accepted.
+        /// The defect and what is accepted.
         message: String,
     },
 }
@@ -169,7 +172,7 @@ impl Problem {
         Self::Unfit(what.into())
     }
 
-    /// What does not fit, unless it `fits`.
+    /// Returns the defect `what` unless `fits`.
     pub(crate) fn unless(fits: bool, what: impl Into<String>) -> Result<(), Self> {
         if fits { Ok(()) } else { Err(Self::unfit(what)) }
     }

@@ -19,13 +19,13 @@ mod write;
 
 pub use clean::{Cleaned, clean};
 pub use dataset::{
-    Dataset, DatasetInfo, Defect, Finding, FramePlace, Identity, Manifest, Mend, Outcome, Overview, Picture, Progress,
-    Run, ShardRecord, ShardWriter, Share, Summary, Verdict, convert, field_files, images_of, inspect, shards_to_make,
-    truth_differs, verify, write_png,
+    Dataset, DatasetInfo, Finding, Fix, FrameLocation, Identity, Manifest, Outcome, Overview, Progress, RgbImage, Run,
+    ShardRecord, ShardWriter, Summary, Task, VerifyProgress, VerifyReport, convert, field_files, image_paths, inspect,
+    missing_shards, truth_difference, verify, verify_with_progress, write_png,
 };
 pub use error::{Error, Problem};
 #[cfg(feature = "cloud")]
 pub use files::Bucket;
-pub use files::{Check, FileRecord, Home, Store, write_file};
+pub use files::{Check, FileRecord, Location, Store, write_file};
 pub use formats::{Format, Layout};
 pub use truth::{Category, Column, Flatten, FrameSummary, columns, rle, truths};

@@ -1,4 +1,4 @@
-//! How much memory frames need, how much there is, and how many frames fit side by side.
+//! Estimates of the memory that frames need, and the number of frames that fit at once.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,51 +7,53 @@ use papsynth::recipe::{Colour, Imaging, Light, Microscope, Mixing, Number, Optic
 
 use crate::formats::{Format, Layout};
 
-/// What the program has before the first frame: the model, fields that all frames share.
+/// Memory of the program before the first frame, bytes: the model and fields that all frames share.
 const PROGRAM: f64 = 32.0 * MIB;
 
-/// What small things need that are not counted one by one.
-const SMALL_THINGS: f64 = 16.0 * MIB;
+/// Memory of small objects that are not counted individually, bytes.
+const SMALL_OBJECTS: f64 = 16.0 * MIB;
 
-/// Side of the square that holds a cell with what its light spreads to, µm, at size 1.
+/// Side of the square around a cell of size 1, including the blur of its image, µm.
 const CELL_UM: f64 = 60.0;
 
-/// Objects that threads which share a frame have at work at most.
-const AT_WORK: f64 = 64.0;
+/// Largest number of objects in work when all threads work on one frame.
+const MAX_ACTIVE_OBJECTS: f64 = 64.0;
 
-/// How much more than counted is asked for, since no two frames are alike.
-const SPARE: f64 = 1.15;
+/// Safety factor for the variation between frames.
+const SAFETY_FACTOR: f64 = 1.15;
 
-/// What the border of a slide's frame adds to its side, px.
+/// Border that is added to the side of a frame of a slide, px.
 #[cfg(feature = "zarr")]
 const BORDER_PX: f64 = 256.0;
 
 const MIB: f64 = 1_048_576.0;
 
-/// Memory that frames of a recipe need, bytes: at least what the program was measured to use, and less than 2.5 times that.
+/// Estimated memory of the frames of a recipe, bytes: at least the measured use, and less than 2.5 times the measured
+/// use.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Need {
-    /// Of the program without any frame.
+pub struct MemoryEstimate {
+    /// Memory of the program without frames.
     program: f64,
-    /// Of each frame that one thread makes.
+    /// Memory of each frame that one thread generates.
     frame: f64,
-    /// Of a frame that all threads share.
+    /// Memory of one frame on which all threads work.
     shared: f64,
 }
 
-/// How a run goes so that it fits.
+/// The parallelism of a run that fits into the memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Fit {
-    /// Frames side by side, each made by a thread of its own.
-    pub at_once: usize,
-    /// Whether all threads share the one frame instead.
+pub struct MemoryPlan {
+    /// Number of frames at once, each on one thread.
+    pub workers: usize,
+    /// Whether all threads work on one frame instead.
     pub shared: bool,
-    /// What that needs, bytes.
+    /// Estimated memory, bytes.
     pub bytes: u64,
 }
 
-impl Need {
-    /// What the largest frame of a recipe may need. The numbers of bytes are measured: see `tests/memory.rs` of papsynth-cli.
+impl MemoryEstimate {
+    /// Returns the estimate for the largest frame of a recipe. `tests/memory.rs` of papsynth-cli measures the
+    /// constants.
     #[must_use]
     pub fn of(recipe: &Recipe, layout: &Layout) -> Self {
         let most = |number: &Number| number.bounds()[1];
@@ -68,7 +70,7 @@ impl Need {
                 (most(oversampling), true, *imaging == Imaging::Abbe)
             }
         };
-        // Channels of the picture, and lights that are imaged at one time.
+        // Channels of the image, and light groups that are imaged at the same time.
         let (channels, lights) = match &recipe.light {
             Light::Monochrome(_) => (1.0, 1.0),
             Light::Colour(Colour { mixing: Mixing::PerWavelength, .. }) => (3.0, 1.0),
@@ -79,7 +81,7 @@ impl Need {
         if is_stack {
             a_pixel += 11.0 * channels;
             if layout.has(Format::Webdataset) {
-                // The whole stack, as it is packed into the tar file.
+                // The complete stack while it is packed into the tar file.
                 a_pixel +=
                     most(&recipe.focus.planes) * channels * if most(&recipe.camera.bits) > 8.0 { 2.0 } else { 1.0 };
             }
@@ -87,95 +89,97 @@ impl Need {
         if is_exact {
             a_pixel += 700.0 * grid;
         }
-        // Samples that a cell has on the grid that light passes.
+        // Samples of a cell on the grid of the optics.
         let of_cell = |size: f64| {
             let side = CELL_UM * size / pixel_um;
             side * side * grid
         };
-        let classes = recipe.cells.values().filter(|mix| most(&mix.count) > 0.0);
-        let cells: Vec<(f64, f64)> = classes.map(|mix| (most(&mix.count), of_cell(most(&mix.size)))).collect();
+        let area_mm2 = recipe.largest_populated_mm2();
+        let counts = recipe.cells.values().map(|mix| (mix.count.bounds(area_mm2)[1], of_cell(most(&mix.size))));
+        let cells: Vec<(f64, f64)> = counts.filter(|(count, _)| *count > 0.0).collect();
         let count: f64 = cells.iter().map(|(count, _)| count).sum();
         let all: f64 = cells.iter().map(|(count, samples)| count * samples).sum();
         let largest = cells.iter().map(|(_, samples)| *samples).fold(0.0, f64::max);
-        // Of a sample of a cell: its phantom; what is kept of it between the planes of a stack; the work on it, in the frame of one
-        // thread, where that memory goes from object to object, and where threads share the frame.
-        let (kept, work, works) = match (is_filtered, lights > 1.0) {
+        // Bytes for each sample of a cell: kept between the planes of a stack; buffers of one thread, reused for all
+        // objects; buffers if threads share the frame.
+        let (kept, buffers, shared_buffers) = match (is_filtered, lights > 1.0) {
             (false, _) => (0.0, 8.0, 8.0),
             (true, false) => (25.0, 136.0, 62.0),
             (true, true) => (116.0, 560.0, 145.0),
         };
-        let objects = SMALL_THINGS + all * (6.4 + if is_stack { kept } else { 0.0 });
-        let frame = pixels * a_pixel + objects + largest * work;
-        let shared = pixels * a_pixel + objects + largest * works * count.min(AT_WORK).max(work / works);
-        Self { program: PROGRAM, frame: SPARE * frame, shared: SPARE * shared }
+        let objects = SMALL_OBJECTS + all * (6.4 + if is_stack { kept } else { 0.0 });
+        let frame = pixels * a_pixel + objects + largest * buffers;
+        let shared = pixels * a_pixel
+            + objects
+            + largest * shared_buffers * count.min(MAX_ACTIVE_OBJECTS).max(buffers / shared_buffers);
+        Self { program: PROGRAM, frame: SAFETY_FACTOR * frame, shared: SAFETY_FACTOR * shared }
     }
 
-    /// What a shard of a slide may need, each of whose frames is made by a thread of its own.
+    /// Returns the estimate for a shard of a slide whose frames are each generated by one thread.
     #[cfg(feature = "zarr")]
     #[must_use]
     pub fn of_slide(recipe: &Recipe, shard_px: u32) -> Self {
         let most = |number: &Number| number.bounds()[1];
-        // With the border that is exposed and cut off.
+        // With the border that is simulated and cropped.
         let side = f64::from(recipe.scan.frame_px) + BORDER_PX;
         let grown = side * side / (recipe.field.width_px.bounds()[0] * recipe.field.height_px.bounds()[0]).max(1.0);
         let mut frame = recipe.clone();
         (frame.field.width_px, frame.field.height_px) = (side.into(), side.into());
-        frame.cells.values_mut().for_each(|mix| mix.count = (most(&mix.count) * grown).into());
+        for mix in frame.cells.values_mut().filter(|mix| !mix.count.is_density()) {
+            mix.count = (most(mix.count.number()) * grown).into();
+        }
         let of_frame = Self::of(&frame, &Layout::default());
         let channels = if matches!(recipe.light, Light::Monochrome(_)) { 1.0 } else { 3.0 };
-        // Grey levels, three labels and layers of a pixel; and once more what is being packed.
+        // Grey levels, three labels and layers of each pixel, and a copy while they are packed.
         let a_pixel = 2.0 * channels * most(&recipe.focus.planes) + 14.0;
         let shard = f64::from(shard_px) * f64::from(shard_px) * (a_pixel + 4.0 * channels);
-        let program = of_frame.program + SPARE * shard;
+        let program = of_frame.program + SAFETY_FACTOR * shard;
         Self { program, frame: of_frame.frame + side * side * a_pixel, shared: f64::INFINITY }
     }
 
-    /// How a run of that many frames side by side, or of one that threads share, goes within a budget: with fewer if need be. Nothing if not
-    /// even one frame fits.
+    /// Returns the parallelism that fits into a budget in bytes: at most `workers` frames at once or, with `shared`,
+    /// one frame on all threads. Returns `None` if one frame does not fit.
     #[must_use]
-    pub fn fit(&self, at_once: usize, shared: bool, budget: Option<u64>) -> Option<Fit> {
+    pub fn plan(&self, workers: usize, shared: bool, budget: Option<u64>) -> Option<MemoryPlan> {
         let budget = budget.map_or(f64::INFINITY, |bytes| bytes as f64);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a float becomes the nearest there is"
-        )]
-        let fit = |at_once: usize, shared: bool, bytes: f64| Fit { at_once, shared, bytes: bytes as u64 };
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "casts saturate")]
+        let fit = |workers: usize, shared: bool, bytes: f64| MemoryPlan { workers, shared, bytes: bytes as u64 };
         if shared && self.program + self.shared <= budget {
             return Some(fit(1, true, self.program + self.shared));
         }
         let needs = |frames: usize| self.program + self.frame * frames as f64;
-        let most = (1..=at_once).rev().find(|frames| needs(*frames) <= budget)?;
+        let most = (1..=workers).rev().find(|frames| needs(*frames) <= budget)?;
         Some(fit(most, false, needs(most)))
     }
 
-    /// What one frame needs, made by one thread, with the program around it, bytes.
+    /// Memory of one frame on one thread, including the program, bytes.
     #[must_use]
     pub fn of_one_frame(&self) -> f64 {
         self.program + self.frame
     }
 
-    /// That not even one frame fits into so many bytes, in words.
+    /// Returns the message that one frame does not fit into `bytes`.
     #[must_use]
     pub fn too_large(&self, recipe: &Recipe, bytes: u64) -> String {
         let field = &recipe.field;
         format!(
-            "field.width_px, field.height_px: a frame of {} x {} pixels needs about {}; {} may be used",
+            "field.width_px, field.height_px: a frame of {} x {} pixels needs about {}; the limit is {}",
             field.width_px.bounds()[1],
             field.height_px.bounds()[1],
-            shown(self.of_one_frame()),
-            shown(bytes as f64)
+            format_bytes(self.of_one_frame()),
+            format_bytes(bytes as f64)
         )
     }
 }
 
-/// Bytes as people read them.
+/// Formats a number of bytes in MiB or GiB.
 #[must_use]
-pub fn shown(bytes: f64) -> String {
+pub fn format_bytes(bytes: f64) -> String {
     if bytes < 1024.0 * MIB { format!("{:.0} MiB", bytes / MIB) } else { format!("{:.1} GiB", bytes / 1024.0 / MIB) }
 }
 
-/// Bytes that can still be had: what the machine has available, or less where a control group allows less. Known on Linux alone.
+/// Returns the available memory in bytes: that of the machine, or the limit of the control group if it is smaller.
+/// Returns `None` on systems other than Linux.
 #[must_use]
 pub fn available() -> Option<u64> {
     let machine = fs::read_to_string("/proc/meminfo").ok().and_then(|text| meminfo(&text))?;
@@ -189,7 +193,7 @@ fn meminfo(text: &str) -> Option<u64> {
     line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kilobytes| kilobytes.saturating_mul(1024))
 }
 
-/// The folders that say what a line of `/proc/self/cgroup` allows, from the group's own up to that of all.
+/// Returns the folders of a control group (a line of `/proc/self/cgroup`) and its parents.
 fn folders_of_group(line: &str) -> Vec<PathBuf> {
     let mut parts = line.splitn(3, ':').skip(1);
     let (Some(controllers), Some(path)) = (parts.next(), parts.next()) else { return Vec::new() };
@@ -201,7 +205,7 @@ fn folders_of_group(line: &str) -> Vec<PathBuf> {
     Path::new(path.trim_start_matches('/')).ancestors().map(|group| root.join(group)).collect()
 }
 
-/// What a control group still allows: files that it has read and not changed can be forgotten.
+/// Returns the memory that a control group has left, bytes. Its inactive file cache counts as free.
 fn left_in_group(folder: &Path) -> Option<u64> {
     let number = |name: &str| fs::read_to_string(folder.join(name)).ok()?.trim().parse::<u64>().ok();
     let limit = number("memory.max").or_else(|| number("memory.limit_in_bytes"))?;
@@ -216,10 +220,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fewer_frames_side_by_side_if_they_do_not_fit_and_none_if_one_does_not() {
-        let need = Need { program: 10.0, frame: 100.0, shared: 300.0 };
-        let fit =
-            |at_once, shared, budget| need.fit(at_once, shared, budget).map(|fit| (fit.at_once, fit.shared, fit.bytes));
+    fn fewer_frames_at_once_if_they_do_not_fit_and_none_if_one_does_not() {
+        let estimate = MemoryEstimate { program: 10.0, frame: 100.0, shared: 300.0 };
+        let fit = |workers, shared, budget| {
+            estimate.plan(workers, shared, budget).map(|fit| (fit.workers, fit.shared, fit.bytes))
+        };
         assert_eq!(fit(8, false, None), Some((8, false, 810)));
         assert_eq!(fit(8, false, Some(400)), Some((3, false, 310)));
         assert_eq!(fit(8, false, Some(110)), Some((1, false, 110)));
@@ -230,11 +235,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_larger_needs_more() {
+    fn larger_recipes_need_more_memory() {
         let need = |change: &dyn Fn(&mut Recipe)| {
             let mut recipe = Recipe::default();
             change(&mut recipe);
-            Need::of(&recipe, &Layout::default())
+            MemoryEstimate::of(&recipe, &Layout::default())
         };
         let usual = need(&|_| {});
         assert!(usual.shared > usual.frame);
@@ -252,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_system_says_is_understood() {
+    fn proc_files_are_parsed() {
         assert_eq!(meminfo("MemTotal: 9 kB\nMemAvailable:       12 kB\n"), Some(12 * 1024));
         let folders = folders_of_group("0::/a/b");
         assert_eq!(folders, ["/sys/fs/cgroup/a/b", "/sys/fs/cgroup/a", "/sys/fs/cgroup/"].map(PathBuf::from));

@@ -173,14 +173,14 @@ def check_objects(coco, rows, frame, labels):
         category = coco.cats[annotation["category_id"]]
         counts[category["name"]] = counts.get(category["name"], 0) + 1
         equal(f"group of {name}", category["supercategory"], GROUPS[row["part"]])
-        whole, front = coco.annToMask(annotation), rle.decode(annotation["front"])
+        whole, front = coco.annToMask(annotation), rle.decode(annotation["visible"])
         for what, found in [
             ("pycocotools' area", int(rle.area(annotation["segmentation"]))),
             ("sum of the mask", int(whole.sum())),
             ("area_px", int(row["area_px"])),
         ]:
             equal(f"{what} of {name}", found, annotation["area"])
-        equal(f"front_area_px of {name}", int(row["front_area_px"]), int(front.sum()))
+        equal(f"visible_area_px of {name}", int(row["visible_area_px"]), int(front.sum()))
         check(not (front & ~whole).any(), f"front of {name} leaves its mask")
         box = [int(row[f"bbox_{side}_px"] or 0) for side in ["x", "y", "width", "height"]]
         equal(f"bbox of {name}", annotation["bbox"], box)

@@ -51,7 +51,7 @@ class Object:
         self.group = GROUPS[annotation["part"]]
         self.id = annotation["object_id"]
         self.mask = rle.decode(annotation["segmentation"]).astype(bool)
-        self.front = rle.decode(annotation["front"]).astype(bool)
+        self.front = rle.decode(annotation["visible"]).astype(bool)
         self.name = f"object {self.id} ({annotation['part']}) of frame {annotation['image_id']}"
 
 
@@ -111,14 +111,14 @@ def check_truth(folder, records):
         for one in frame.objects:
             annotation = one.annotation
             objects += 1
-            for key in ["segmentation", "front"]:
+            for key in ["segmentation", "visible"]:
                 equal(f"size of {key} of {one.name}", tuple(annotation[key]["size"]), frame.shape)
                 again = rle.encode(np.asfortranarray(rle.decode(annotation[key])))
                 written = annotation[key]["counts"]
                 written = written if isinstance(written, bytes) else written.encode()
                 equal(f"counts of {key} of {one.name} after decoding and encoding", again["counts"], written)
             equal(f"area of {one.name}", annotation["area"], int(rle.area(annotation["segmentation"])))
-            equal(f"front_area of {one.name}", annotation["front_area"], int(rle.area(annotation["front"])))
+            equal(f"visible_area of {one.name}", annotation["visible_area"], int(rle.area(annotation["visible"])))
             box = [float(v) for v in annotation["bbox"]]
             equal(f"bbox of {one.name}", [float(v) for v in rle.toBbox(annotation["segmentation"])], box)
             if annotation["area"]:
@@ -138,7 +138,7 @@ def check_truth(folder, records):
             same(f"front-most {group} of frame {frame.index} by depth", frame.labels(group, "top"), nearest)
             masks = sum(int(one.mask.sum()) for one in frame.of(group))
             lost = masks - int(np.count_nonzero(frame.labels(group, frame.policy)))
-            equal(f"pixels of {group} lost in frame {frame.index}", frame.summary["lost_px"][group], lost)
+            equal(f"pixels of {group} lost in frame {frame.index}", frame.summary["occluded_px"][group], lost)
     passed(f"shards/*.coco.json: pycocotools gives back every mask, area and box of {objects} objects in {len(frames)} frames")
     return frames
 
@@ -156,7 +156,7 @@ def check_tables(folder, frames, records):
             found = [int(row["image"]), int(row["id"]), row["part"], row["class"], int(row["area_px"])]
             expected = [annotation[key] for key in ["image_id", "object_id", "part", "class", "area"]]
             equal(f"row of {one.name}", found, expected)
-            for key in ["depth_um", "stain", "area_um2", "rotation_deg"]:
+            for key in ["depth_um", "mean_absorbance", "area_um2", "rotation_deg"]:
                 equal(f"{key} of {one.name}", float(row[key]), annotation[key])
             for key in ["defocus_um", "detectability"]:
                 equal(f"{key} of {one.name}", [float(v) for v in row[key].split(";")], annotation[key])

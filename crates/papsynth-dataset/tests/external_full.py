@@ -101,7 +101,7 @@ def check_tables(folder, frames, records):
                     equal(f"{key} in {name}.parquet", value, type(value)(text) if value is not None else text or None)
             one = by_place[found["image"], found["id"], found["part"]]
             size = [found["image_height_px"], found["image_width_px"]]
-            for key, area, written in [("rle", "area_px", "segmentation"), ("front_rle", "front_area_px", "front")]:
+            for key, area, written in [("rle", "area_px", "segmentation"), ("visible_rle", "visible_area_px", "visible")]:
                 counts = one.annotation[written]["counts"]
                 counts = counts.decode() if isinstance(counts, bytes) else counts
                 equal(f"{key} of {one.name} in {name}.parquet", found[key], counts)
@@ -155,12 +155,12 @@ def check_row(row, bare, frame, categories):
     equal(f"objects of {what}", len(row["objects"]), len(frame.objects))
     for found, one in zip(row["objects"], frame.objects):
         annotation = one.annotation
-        keys = ["part", "kind", "class", "bethesda", "traits", "cluster", "bbox", "area", "front_area", "area_um2", "depth_um", "stain", "tint", "truncated"]
+        keys = ["part", "kind", "class", "bethesda", "traits", "cluster", "bbox", "area", "visible_area", "area_um2", "depth_um", "mean_absorbance", "tint", "truncated"]
         for key in keys:
             equal(f"{key} of {one.name} in {what}", found[key], annotation[key])
         equal(f"id of {one.name} in {what}", found["id"], one.id)
         equal(f"category of {one.name}", categories[found["category"]]["id"], annotation["category_id"])
-        for key, written in [("rle", "segmentation"), ("front_rle", "front")]:
+        for key, written in [("rle", "segmentation"), ("visible_rle", "visible")]:
             counts = annotation[written]["counts"]
             equal(f"{key} of {one.name} in {what}", found[key], counts.decode() if isinstance(counts, bytes) else counts)
         area = int(rle.area({"size": list(frame.shape), "counts": found["rle"]}))

@@ -87,7 +87,7 @@ def check_zarr(frames):
                 same(f"{one.name} in {path}", mask, one.mask)
                 row, annotation = known[one.id], one.annotation
                 equal(f"area of {one.name} in {path}", [row["area_px"], int(mask.sum())], [annotation["area"]] * 2)
-                for key in ["class", "bethesda", "kind", "depth_um", "stain", "area_um2", "truncated"]:
+                for key in ["class", "bethesda", "kind", "depth_um", "mean_absorbance", "area_um2", "truncated"]:
                     equal(f"{key} of {one.name} in {path}", row[key], annotation[key])
                 equal(f"category of {one.name} in {path}", row["category"], frame.coco.cats[annotation["category_id"]]["name"])
                 parent = annotation["parent_id"] and frame.coco.anns[annotation["parent_id"]]["object_id"]

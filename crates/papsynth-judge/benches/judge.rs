@@ -3,15 +3,15 @@
 use std::hint::black_box;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
-use papsynth_judge::{Detail, Field, Gauge, GaugeParams, Judge, JudgeParams, NucleiFrom};
+use papsynth_judge::{Detail, Field, Judge, JudgeParams, Measurer, MeasurerParams, NucleiFrom};
 
 #[path = "../tests/support/mod.rs"]
 mod support;
 
 use support::Toy;
 
-fn gauge(detail: Detail) -> Gauge {
-    Gauge::new(&GaugeParams { nuclei_from: NucleiFrom::Search, detail, ..GaugeParams::default() })
+fn measurer(detail: Detail) -> Measurer {
+    Measurer::new(&MeasurerParams { nuclei_from: NucleiFrom::Search, detail, ..MeasurerParams::default() })
         .expect("defaults are in range")
 }
 
@@ -21,8 +21,8 @@ fn measure(c: &mut Criterion) {
     let mut group = c.benchmark_group("measure 1280x960");
     group.sample_size(10).throughput(Throughput::Elements(1));
     for (name, detail) in [("statistics", Detail::Statistics), ("everything", Detail::Everything)] {
-        let gauge = gauge(detail);
-        group.bench_function(name, |b| b.iter(|| gauge.measure(black_box(&picture))));
+        let measurer = measurer(detail);
+        group.bench_function(name, |b| b.iter(|| measurer.measure(black_box(&picture))));
     }
     group.finish();
 }
@@ -30,9 +30,9 @@ fn measure(c: &mut Criterion) {
 /// Twelve fields against twelve, measured before, on all threads.
 fn compare(c: &mut Criterion) {
     let toy = Toy { width: 640, height: 480, cells: 12, ..Toy::default() };
-    let gauge = gauge(Detail::Everything);
+    let measurer = measurer(Detail::Everything);
     let fields = |seed: u64| -> Vec<Field> {
-        toy.pictures(12, seed).iter().map(|p| gauge.measure(p).expect("toy fields are pictures")).collect()
+        toy.pictures(12, seed).iter().map(|p| measurer.measure(p).expect("toy fields are pictures")).collect()
     };
     let (real, synthetic) = (fields(1), fields(100));
     let mut group = c.benchmark_group("compare 12 with 12");

@@ -7,7 +7,7 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use image::GrayImage;
-use papsynth_judge::{Field, Gauge, GaugeParams, Judge, JudgeParams, Picture};
+use papsynth_judge::{Field, FieldImage, Judge, JudgeParams, Measurer, MeasurerParams};
 
 #[path = "../tests/support/mod.rs"]
 mod support;
@@ -21,10 +21,11 @@ const BARS: u32 = 90;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args_os().nth(1).map_or_else(|| PathBuf::from("target/toys.png"), PathBuf::from);
-    let gauge = Gauge::new(&GaugeParams::default())?;
+    let measurer = Measurer::new(&MeasurerParams::default())?;
     let sharp = Toy::default().pictures(FIELDS, 1);
     let blunt = Toy { blur: 1.5, ..Toy::default() }.pictures(FIELDS, 100);
-    let measure = |pictures: &[Picture]| pictures.iter().map(|p| gauge.measure(p)).collect::<Result<Vec<Field>, _>>();
+    let measure =
+        |pictures: &[FieldImage]| pictures.iter().map(|p| measurer.measure(p)).collect::<Result<Vec<Field>, _>>();
     let (real, synthetic) = (measure(&sharp)?, measure(&blunt)?);
     let report = Judge::new(&JudgeParams::default())?.compare(&real, &synthetic)?;
 
@@ -52,9 +53,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     picture.save(&path)?;
-    eprintln!("{}: nuclei {}, AUC {:.3}", path.display(), nuclei.verdict, nuclei.result.auc);
-    for giveaway in nuclei.result.giveaways.iter().take(3) {
-        eprintln!("  {}: {:.3} against {:.3}", giveaway.feature, giveaway.real[1], giveaway.synthetic[1]);
+    eprintln!("{}: nuclei {}, AUC {:.3}", path.display(), nuclei.conclusion, nuclei.result.auc);
+    for feature in nuclei.result.distinguishing_features.iter().take(3) {
+        eprintln!("  {}: {:.3} against {:.3}", feature.feature, feature.real[1], feature.synthetic[1]);
     }
     Ok(())
 }

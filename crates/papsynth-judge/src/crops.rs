@@ -1,14 +1,14 @@
-//! What the classifier was most and least sure of, cut from the fields.
+//! Crops of the nuclei and patches with the highest and lowest scores.
 
 use crate::measure::{Field, PATCH_PX};
 use crate::number::whole;
-use crate::table::Table;
+use crate::table::FeatureTable;
 use crate::two_sample::TwoSample;
 
-/// How many are shown of each kind.
+/// Number of crops of a sheet.
 const SHOWN: usize = 20;
 
-/// Side of the picture of a nucleus, pixels.
+/// Width and height of the crop of a nucleus, pixels.
 const NUCLEUS_PX: usize = 64;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -22,14 +22,14 @@ pub(crate) struct Sheet {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Crop {
     pub(crate) field: String,
-    /// How synthetic it looked, 0 to 1.
+    /// Score of the classifier: 0 looks real, 1 looks synthetic.
     pub(crate) score: f64,
     pub(crate) grey: Vec<u8>,
     pub(crate) width: usize,
 }
 
-/// A name, the table of it, and the side of its picture.
-type Kind = (&'static str, fn(&Field) -> &Table, usize);
+/// Name, feature table and crop size of one kind of objects.
+type Kind = (&'static str, fn(&Field) -> &FeatureTable, usize);
 
 pub(crate) fn sheets<'a>(
     real: &[Field],
@@ -41,8 +41,8 @@ pub(crate) fn sheets<'a>(
     for (of, table, side) in kinds {
         let Some(result) = result(of) else { continue };
         for (fields, scores, titles) in [
-            (synthetic, &result.scores[1], ["Synthetic, most convincing", "Synthetic, least convincing"]),
-            (real, &result.scores[0], ["Real, most plainly real", "Real, taken for synthetic"]),
+            (synthetic, &result.scores[1], ["Synthetic, look most real", "Synthetic, look least real"]),
+            (real, &result.scores[0], ["Real, look most real", "Real, look most synthetic"]),
         ] {
             let places = fields.iter().flat_map(|f| table(f).places.iter().map(move |p| (f, *p)));
             let mut all: Vec<(f64, (&Field, [f64; 2]))> = scores.iter().copied().zip(places).collect();
@@ -57,7 +57,7 @@ pub(crate) fn sheets<'a>(
     sheets
 }
 
-/// The square around a place, moved into the field where it would reach beyond.
+/// Cuts a square around a place, shifted into the field if it crosses the border.
 fn cut(field: &Field, [x, y]: [f64; 2], side: usize, score: f64) -> Option<Crop> {
     if field.thumbnail.is_empty() {
         return None;

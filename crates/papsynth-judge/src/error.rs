@@ -1,50 +1,53 @@
-//! What is refused.
+//! Errors.
 
-/// Why something cannot be judged.
+/// An invalid parameter or input, or a stop.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A parameter is outside its range.
-    #[error("{field} is {value}; accepted is {accepted}")]
+    /// A parameter is out of range.
+    #[error("{field} = {value} is out of range: expected {accepted}")]
     Parameter {
         /// Name of the field.
         field: &'static str,
         /// Its value.
         value: f64,
-        /// What would be accepted.
+        /// Accepted range.
         accepted: &'static str,
     },
-    /// A picture whose size, grey levels or nuclei cannot be right.
-    #[error("picture `{name}` {what}")]
-    Picture {
-        /// Name of the picture.
+    /// An image with an invalid size, invalid grey levels or invalid nuclei.
+    #[error("image `{name}` {what}")]
+    Image {
+        /// Name of the image.
         name: String,
-        /// What is wrong with it.
+        /// Description of the error.
         what: String,
     },
-    /// Too few pictures to set some aside.
-    #[error("there are {count} {side} fields; at least {least} are needed, since fields are never split between folds")]
+    /// Too few fields for cross-validation.
+    #[error("{count} {side} {}; expected {least} or more, because cross-validation never splits a field", if *count == 1 { "field" } else { "fields" })]
     Fields {
         /// "real" or "synthetic".
         side: &'static str,
-        /// How many there are.
+        /// Number of fields.
         count: usize,
-        /// How many are needed.
+        /// Minimum number.
         least: usize,
     },
-    /// Pictures that were measured in different ways.
-    #[error("field `{name}` was measured with other parameters than the first; measure both sides with one gauge")]
-    Gauge {
+    /// Fields that were measured with different parameters.
+    #[error("field `{name}` was measured with other parameters than the first; measure both sides with one `Measurer`")]
+    Measurer {
         /// Name of the field.
         name: String,
     },
+    /// The stop flag was set.
+    #[error("stopped")]
+    Stopped,
 }
 
 impl Error {
-    /// Refuses the first parameter that is outside its range: each with its name, value, least and most, and what would be accepted.
+    /// Checks parameters: each with its name, value, minimum and maximum, and the accepted range in words.
     ///
     /// # Errors
-    /// If one is.
+    /// [`Error::Parameter`] for the first one out of range.
     pub fn check(parameters: &[(&'static str, f64, [f64; 2], &'static str)]) -> Result<(), Self> {
         let bad = parameters.iter().find(|(_, value, [least, most], _)| !(value >= least && value <= most));
         bad.map_or(Ok(()), |&(field, value, _, accepted)| Err(Self::Parameter { field, value, accepted }))

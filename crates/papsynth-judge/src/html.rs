@@ -1,4 +1,4 @@
-//! The report as a page that needs nothing else.
+//! The report as a self-contained HTML page.
 
 use std::fmt::Write;
 
@@ -6,23 +6,23 @@ use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 
 use crate::crops::Sheet;
-use crate::judge::{Beside, Curve, Report, Spread, Test, Verdict};
+use crate::judge::{Conclusion, Curve, FieldComparison, Percentiles, Report, Test};
 use crate::moments::Moments;
 use crate::number::nearest;
 use crate::svg::{COLOURS, Plot, escape, short};
 use crate::two_sample::TwoSample;
 
-/// Giveaways that are listed.
+/// Number of features in a table.
 const LISTED: usize = 30;
 
 const STYLE: &str = "body{font:15px/1.45 system-ui,sans-serif;margin:2em auto;max-width:1240px;padding:0 1em;color:#222}\
 h1{font-size:1.5em}h2{margin-top:2em;border-bottom:1px solid #ccc}table{border-collapse:collapse;font-size:13px}\
 td,th{padding:2px 9px;text-align:right;border-bottom:1px solid #eee}td:first-child,th:first-child{text-align:left}\
 svg text{font:11px system-ui,sans-serif;fill:#333}svg .title{font-weight:600;font-size:12px}\
-.told{color:#b03000;font-weight:600}.not{color:#00704a;font-weight:600}.out{color:#b03000}\
+.different{color:#b03000;font-weight:600}.similar{color:#00704a;font-weight:600}.out{color:#b03000}\
 .real{color:#0072b2}.synthetic{color:#d55e00}.plots{display:flex;flex-wrap:wrap;gap:14px}\
 .crops{display:flex;flex-wrap:wrap;gap:5px}.crops figure{margin:0;font-size:10px;text-align:center;color:#666}\
-.nuclei img{width:80px;image-rendering:pixelated}.patches img{width:150px}.note{color:#555}";
+.nuclei img{width:80px;image-rendering:pixelated}.patches img{width:150px}.note{color:#555}.warning{color:#b03000}.about{text-align:left}";
 
 /// Adds text to a page. Writing to a string cannot fail.
 macro_rules! put {
@@ -32,31 +32,31 @@ macro_rules! put {
 }
 
 impl Report {
-    /// The report as an HTML page that loads nothing from elsewhere. It shows pieces of the pictures that were judged.
+    /// Returns the report as an HTML page that loads no other files. It shows crops of the images.
     #[must_use]
     pub fn to_html(&self) -> String {
         let mut page = String::new();
         let [real, synthetic] = self.fields.each_ref().map(Vec::len);
-        let nuclei = match self.gauge.nuclei_from {
+        let nuclei = match self.measurement.nuclei_from {
             crate::NucleiFrom::Masks => "from masks",
-            crate::NucleiFrom::Points => "around given points",
-            crate::NucleiFrom::Search => "found",
+            crate::NucleiFrom::Points => "at annotated points",
+            crate::NucleiFrom::Search => "segmented",
         };
         put!(
             page,
             "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>papsynth judge</title><style>{STYLE}</style></head><body>\
-             <h1>{real} real fields against {synthetic} synthetic ones: {}</h1>",
-            verdict(self.verdict)
+             <h1>{real} real fields and {synthetic} synthetic fields: {}</h1>",
+            conclusion(self.conclusion)
         );
         put!(
             page,
-            "<p>Pixels of {} µm; nuclei {nuclei}; seed {}. <span class=\"real\">Real</span> and <span class=\"synthetic\">synthetic</span> \
-             have these colours throughout.</p>",
-            self.gauge.pixel_um,
+            "<p>Pixel size {} µm; nuclei {nuclei}; seed {}. Colours: <span class=\"real\">real</span>, \
+             <span class=\"synthetic\">synthetic</span>.</p>",
+            self.measurement.pixel_um,
             self.judge.seed
         );
-        for note in &self.notes {
-            put!(page, "<p class=\"note\">{}</p>", escape(note));
+        for warning in &self.warnings {
+            put!(page, "<p class=\"warning\">Warning: {}</p>", escape(warning));
         }
         summary(&mut page, self);
         for test in &self.two_sample {
@@ -65,18 +65,18 @@ impl Report {
         for test in &self.moments {
             moments(&mut page, test);
         }
-        beside(&mut page, &self.beside);
+        field_comparison(&mut page, &self.field_comparison);
         page.push_str("</body></html>\n");
         page
     }
 }
 
-fn verdict(verdict: Verdict) -> String {
-    let class = if verdict == Verdict::ToldApart { "told" } else { "not" };
-    format!("<span class=\"{class}\">{verdict}</span>")
+fn conclusion(conclusion: Conclusion) -> String {
+    let class = if conclusion == Conclusion::Distinguishable { "different" } else { "similar" };
+    format!("<span class=\"{class}\">{conclusion}</span>")
 }
 
-/// A row of a table; red if it is not within what is expected.
+/// Adds a table row; red if the value is outside the expected range.
 fn row(page: &mut String, within: bool, cells: impl IntoIterator<Item = String>) {
     page.push_str(if within { "<tr>" } else { "<tr class=\"out\">" });
     cells.into_iter().for_each(|cell| put!(page, "<td>{cell}</td>"));
@@ -84,18 +84,18 @@ fn row(page: &mut String, within: bool, cells: impl IntoIterator<Item = String>)
 }
 
 fn summary(page: &mut String, report: &Report) {
-    page.push_str("<h2>Tests</h2><table><tr><th>test</th><th>rows</th><th>AUC</th><th>95 % interval</th><th>between real halves</th><th>verdict</th></tr>");
+    page.push_str("<h2>Tests</h2><table><tr><th>test</th><th>objects</th><th>AUC</th><th>95 % interval</th><th>between real halves</th><th>conclusion</th></tr>");
     for test in &report.two_sample {
         let TwoSample { rows: [real, synthetic], auc, interval: [low, high], null, null_rows, .. } = &test.result;
-        let null = Spread::of(null.iter().copied());
+        let null = Percentiles::of(null.iter().copied());
         let [p10, p50, p90] = [null.p10, null.p50, null.p90].map(known);
         let cells = [
             format!("classifier on {}", escape(&test.name)),
             format!("{real} / {synthetic}"),
             format!("{auc:.3}"),
             format!("{low:.3} – {high:.3}"),
-            format!("{p50} ({p10} – {p90}), {null_rows} rows a half"),
-            verdict(test.verdict),
+            format!("{p50} ({p10} – {p90}), {null_rows} objects per half"),
+            conclusion(test.conclusion),
         ];
         row(page, true, cells);
     }
@@ -104,14 +104,15 @@ fn summary(page: &mut String, report: &Report) {
         let outside = descriptors.iter().filter(|d| !d.within).count();
         let slopes: Vec<String> = descriptors.iter().map(|d| format!("{:.2}", d.slope[1])).collect();
         let name = format!("Q-Q slopes, {}", escape(&test.name));
-        let outside = format!("{outside} of {} outside", descriptors.len());
-        row(page, true, [name, n.to_string(), String::new(), slopes.join(" "), outside, verdict(test.verdict)]);
+        let outside = format!("{outside} of {} descriptors outside", descriptors.len());
+        row(page, true, [name, n.to_string(), String::new(), slopes.join(" "), outside, conclusion(test.conclusion)]);
     }
     page.push_str(
-        "</table><p class=\"note\">A classifier tells the sides apart if its area under the ROC curve is larger than 95 of 100 between random \
-         halves of the real fields, and the 95 % interval of it (fields drawn with replacement) leaves out ½. Fields are never split between what it learns from and \
-         what it is tried on. Moments tell them apart if a slope or a shift of medians lies outside what 199 of 200 pairs of disjoint \
-         real halves show at the same number of nuclei: by chance, one of the twelve does in one comparison of seventeen or fewer.</p>",
+        "</table><p class=\"note\">AUC is the area under the ROC curve of a random forest: 0.5 is chance level, 1 is a perfect separation. \
+         Cross-validation never splits a field. A classifier test concludes “distinguishable” if its AUC exceeds 95 of 100 AUCs between random \
+         halves of the real fields and its 95 % interval (bootstrap over fields) excludes 0.5. A Q-Q test concludes “distinguishable” if a slope \
+         or a shift of medians is outside the range of 199 of 200 pairs of disjoint real halves with the same number of nuclei. By chance this \
+         happens in at most 1 of 17 comparisons.</p>",
     );
 }
 
@@ -121,24 +122,29 @@ fn known(value: Option<f64>) -> String {
 
 fn two_sample(page: &mut String, test: &Test<TwoSample>, crops: &[Sheet]) {
     let r = &test.result;
-    let (name, auc, verdict) = (escape(&test.name), r.auc, verdict(test.verdict));
-    put!(page, "<h2>What gives {name} away</h2><p>AUC {auc:.3}, {verdict}. With features of one kind alone: ");
-    let kinds: Vec<String> =
-        r.families.iter().map(|f| format!("{} {:.2}", format!("{:?}", f.family).to_lowercase(), f.auc)).collect();
+    let (name, auc, conclusion) = (escape(&test.name), r.auc, conclusion(test.conclusion));
+    put!(
+        page,
+        "<h2>Features that distinguish {name}</h2><p>AUC {auc:.2}, {conclusion}: {}. AUC with the features of one kind only: ",
+        escape(&r.meaning)
+    );
+    let kinds: Vec<String> = r.kinds.iter().map(|f| format!("{} {:.2}", f.kind.name(), f.auc)).collect();
     put!(page, "{}.</p><div class=\"plots\">{}{}</div>", kinds.join(", "), strip(r), scores(r));
     page.push_str(
-        "<table><tr><th>feature</th><th>importance</th><th>AUC alone</th><th class=\"real\">real p10</th><th class=\"real\">p50</th><th class=\"real\">p90</th>\
+        "<table><tr><th>feature</th><th>importance</th><th>AUC of the feature</th><th class=\"real\">real p10</th><th class=\"real\">p50</th><th class=\"real\">p90</th>\
          <th class=\"synthetic\">synthetic p10</th><th class=\"synthetic\">p50</th><th class=\"synthetic\">p90</th>\
          <th class=\"real\">sd between fields</th><th class=\"synthetic\">sd between fields</th></tr>",
     );
-    for g in r.giveaways.iter().take(LISTED) {
-        let first = [escape(&g.feature), format!("{:.3}", g.importance), format!("{:.2}", g.alone)];
+    for g in r.distinguishing_features.iter().take(LISTED) {
+        let name = format!("<span title=\"{}\">{}</span>", escape(&g.feature), escape(&g.description));
+        let first = [name, format!("{:.0} %", 100.0 * g.importance), format!("{:.2}", g.single_auc)];
         let numbers = g.real.iter().chain(&g.synthetic).chain(&g.between_fields);
         row(page, true, first.into_iter().chain(numbers.map(|v| short(*v))));
     }
     page.push_str(
-        "</table><p class=\"note\">Importance: how much nearer the mean scores of both sides come, as a part of their distance, when the feature is \
-         shuffled among rows that the classifier has not seen. Of features that tell the same, each alone matters little. AUC alone is above ½ if the feature is larger in synthetic fields. Between fields: of their medians.</p>",
+        "</table><p class=\"note\">Importance: the loss of separation when the values of the feature are permuted among test rows, as a fraction of the \
+         losses of all features. Correlated features share their importance. The AUC of the feature is above 0.5 if its values are larger in \
+         synthetic fields. sd between fields: standard deviation of the medians of fields.</p>",
     );
     for sheet in crops.iter().filter(|sheet| sheet.of == test.name && !sheet.crops.is_empty()) {
         put!(page, "<h3>{}</h3><div class=\"crops {}\">", sheet.title, sheet.of);
@@ -153,7 +159,7 @@ fn two_sample(page: &mut String, test: &Test<TwoSample>, crops: &[Sheet]) {
 
 fn strip(r: &TwoSample) -> String {
     let all = r.null.iter().copied().chain(r.interval).chain([0.3, 1.0]);
-    let names = ["AUC with its 95 % interval", "AUC", "1 real halves, 2 the sides"];
+    let names = ["AUC with 95 % interval", "AUC", "1: between real halves, 2: between sides"];
     let mut plot = Plot::new(names, all, [0.0, 3.0].into_iter());
     plot.dashes([0.5, 0.0], [0.5, 3.0]);
     plot.dots(r.null.iter().map(|v| [*v, 1.0]), COLOURS[0]);
@@ -169,7 +175,7 @@ fn scores(r: &TwoSample) -> String {
         scores.iter().for_each(|s| bins[nearest(s * BINS as f64 - 0.5).min(BINS - 1)] += part);
         bins
     });
-    let names = ["Scores of rows not learnt from", "how synthetic it looks", "part"];
+    let names = ["Scores of test rows", "0: looks real, 1: looks synthetic", "fraction"];
     let mut plot = Plot::new(names, [0.0, 1.0].into_iter(), bins.iter().flatten().copied().chain([0.0]));
     for (bins, colour) in bins.iter().zip(COLOURS) {
         plot.line(bins.iter().enumerate().map(|(i, v)| [(i as f64 + 0.5) / BINS as f64, *v]), colour);
@@ -178,46 +184,46 @@ fn scores(r: &TwoSample) -> String {
 }
 
 fn moments(page: &mut String, test: &Test<Moments>) {
-    put!(page, "<h2>{}: {}</h2>", escape(&test.name), verdict(test.verdict));
+    put!(page, "<h2>{}: {}</h2>", escape(&test.name), conclusion(test.conclusion));
     page.push_str(
-        "<table><tr><th>descriptor</th><th>Q-Q slope (5 – 95 %)</th><th>between real halves (0.25 – 99.75 %)</th><th>shift, sd (5 – 95 %)</th>\
+        "<table><tr><th>descriptor</th><th>Q-Q slope (5 – 95 %)</th><th>between real halves (0.25 – 99.75 %)</th><th>shift of the median, sd (5 – 95 %)</th>\
          <th>between real halves</th></tr>",
     );
     for d in &test.result.descriptors {
         let numbers = [d.slope, d.null_slope, d.shift, d.null_shift]
             .map(|[low, middle, high]| format!("{middle:.2} ({low:.2} – {high:.2})"));
-        row(page, d.within, std::iter::once(escape(&d.name)).chain(numbers));
+        row(page, d.within, std::iter::once(escape(&d.description)).chain(numbers));
     }
     page.push_str("</table><div class=\"plots\">");
     for d in &test.result.descriptors {
         let all: Vec<f64> = d.quantiles.iter().flatten().copied().collect();
         let (low, high) = all.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-        let mut plot = Plot::new([&d.name, "synthetic", "real"], all.iter().copied(), all.iter().copied());
+        let mut plot = Plot::new([&d.description, "synthetic", "real"], all.iter().copied(), all.iter().copied());
         plot.dashes([low, low], [high, high]);
         plot.dots(d.quantiles.iter().map(|q| [q[1], q[0]]), COLOURS[1]);
         page.push_str(&plot.finish());
     }
-    page.push_str("</div><p class=\"note\">Quantiles of all nuclei of either side; the slopes are those of random draws of as many as the heading says. Steeper than the dashes: real nuclei spread more.</p>");
+    page.push_str("</div><p class=\"note\">Quantiles of all nuclei of each side; the slopes are medians over random draws of the number of nuclei in the heading. Steeper than the dashed line: real nuclei vary more.</p>");
 }
 
-fn beside(page: &mut String, beside: &Beside) {
+fn field_comparison(page: &mut String, comparison: &FieldComparison) {
     page.push_str("<h2>Field statistics</h2><div class=\"plots\">");
-    for curve in &beside.curves {
+    for curve in &comparison.curves {
         page.push_str(&drawn(curve));
     }
     page.push_str(
         "</div><table><tr><th>statistic</th><th class=\"real\">real p10</th><th class=\"real\">p50</th><th class=\"real\">p90</th>\
          <th class=\"synthetic\">synthetic p10</th><th class=\"synthetic\">p50</th><th class=\"synthetic\">p90</th></tr>",
     );
-    for s in &beside.scalars {
+    for s in &comparison.scalars {
         let numbers = [s.real, s.synthetic].into_iter().flat_map(|side| [side.p10, side.p50, side.p90]).map(known);
-        row(page, s.within, std::iter::once(escape(&s.name)).chain(numbers));
+        row(page, s.within, std::iter::once(escape(&s.description)).chain(numbers));
     }
-    page.push_str("</table><p class=\"note\">Over fields. Red: the synthetic median lies outside the real 10th to 90th percentile.</p>");
+    page.push_str("</table><p class=\"note\">Percentiles over fields. Red: the synthetic median is outside the real 10th to 90th percentile.</p>");
 }
 
 fn drawn(curve: &Curve) -> String {
-    let points = |spreads: &[Spread], of: fn(&Spread) -> Option<f64>| -> Vec<[f64; 2]> {
+    let points = |spreads: &[Percentiles], of: fn(&Percentiles) -> Option<f64>| -> Vec<[f64; 2]> {
         curve.at.iter().zip(spreads).map(|(x, s)| [*x, of(s).unwrap_or(f64::NAN)]).collect()
     };
     let all = curve.real.iter().chain(&curve.synthetic).flat_map(|s| [s.p10, s.p90]).flatten();
@@ -235,7 +241,7 @@ fn png(grey: &[u8], width: usize) -> Vec<u8> {
     let mut encoder = png::Encoder::new(&mut out, size[0], size[1]);
     encoder.set_color(png::ColorType::Grayscale);
     encoder.set_depth(png::BitDepth::Eight);
-    // Crops are at least a pixel, and memory takes what is written to it.
+    // Writing to memory cannot fail, and a crop has at least one pixel.
     let _ = encoder.write_header().and_then(|mut writer| writer.write_image_data(grey));
     out
 }

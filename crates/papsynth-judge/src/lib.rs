@@ -1,34 +1,39 @@
 #![doc = include_str!("../README.md")]
 
 mod background;
+mod control;
 mod crops;
+mod describe;
 mod error;
 #[doc(hidden)]
 pub mod filter;
 mod html;
+mod image;
 mod judge;
 mod measure;
 mod moments;
 mod nuclei;
 #[doc(hidden)]
 pub mod number;
-mod picture;
 mod region;
 mod statistics;
 pub mod svg;
 mod table;
+mod text;
 mod tree;
 mod two_sample;
 
+pub use control::{Control, Phase, Progress};
+pub use describe::describe;
 pub use error::Error;
-pub use judge::{Beside, Curve, Judge, JudgeParams, Report, Scalar, Spread, Test, Verdict};
+pub use image::{FieldImage, NucleiAnnotation};
+pub use judge::{Conclusion, Curve, FieldComparison, Judge, JudgeParams, Percentiles, Report, Scalar, Test};
 pub use measure::{
-    Detail, Field, Gauge, GaugeParams, HISTOGRAM, HISTOGRAM_FROM, HISTOGRAM_STEP, Named, NucleiFrom, PROFILE, RADII_UM,
-    Statistics, clark_evans, frequencies, ripley,
+    Detail, Field, HISTOGRAM, HISTOGRAM_FROM, HISTOGRAM_STEP, Measurer, MeasurerParams, Named, NucleiFrom, PROFILE,
+    RADII_UM, Statistics, clark_evans, frequencies, ripley,
 };
 pub use moments::{Descriptor, Moments, qq_slope};
 pub use nuclei::NucleiParams;
-pub use picture::{Known, Picture};
 pub use statistics::auc;
-pub use table::{Family, Feature, Table};
-pub use two_sample::{FamilyAlone, Giveaway, TwoSample, TwoSampleParams, two_sample};
+pub use table::{Feature, FeatureKind, FeatureTable};
+pub use two_sample::{DistinguishingFeature, KindAuc, TwoSample, TwoSampleParams, two_sample};

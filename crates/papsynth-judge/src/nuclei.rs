@@ -1,8 +1,8 @@
 //! Nuclei: where they are, pixel by pixel.
 
 use crate::filter::blur;
+use crate::image::NucleiAnnotation;
 use crate::number::whole;
-use crate::picture::Known;
 use crate::region::{Region, components, flood};
 use crate::tree::{Blob, STEP, blobs};
 
@@ -53,13 +53,13 @@ pub(crate) fn nuclei(
     absorbance: &[f32],
     width: usize,
     pixel_um: f64,
-    known: &Known,
+    known: &NucleiAnnotation,
     params: &NucleiParams,
 ) -> Vec<Region> {
     let mut regions = match known {
-        Known::Masks(labels) => masks(labels, width),
-        Known::Nothing => found(absorbance, width, pixel_um, None, params),
-        Known::Points(points) => found(absorbance, width, pixel_um, Some(points), params),
+        NucleiAnnotation::Masks(labels) => masks(labels, width),
+        NucleiAnnotation::None => found(absorbance, width, pixel_um, None, params),
+        NucleiAnnotation::Points(points) => found(absorbance, width, pixel_um, Some(points), params),
     };
     regions.retain(|r| r.pixels.len() as f64 * pixel_um * pixel_um >= params.smallest_um2);
     regions.sort_by_key(|r| r.pixels.iter().min().copied());
@@ -177,7 +177,7 @@ mod tests {
         (0..200 * 150).map(at).collect()
     }
 
-    fn areas(image: &[f32], known: &Known) -> Vec<usize> {
+    fn areas(image: &[f32], known: &NucleiAnnotation) -> Vec<usize> {
         nuclei(image, 200, PIXEL_UM, known, &NucleiParams::default()).iter().map(|r| r.pixels.len()).collect()
     }
 
@@ -185,7 +185,7 @@ mod tests {
     fn a_disc_is_found_to_the_middle_of_its_rim() {
         for radius in [8.0, 12.0, 20.0] {
             let image = image(&[([80.2, 70.7], radius, 0.3)]);
-            let found = nuclei(&image, 200, PIXEL_UM, &Known::Nothing, &NucleiParams::default());
+            let found = nuclei(&image, 200, PIXEL_UM, &NucleiAnnotation::None, &NucleiParams::default());
             assert_eq!(found.len(), 1);
             let shape = found[0].shape();
             let wanted = std::f64::consts::PI * radius * radius;
@@ -196,32 +196,32 @@ mod tests {
 
     #[test]
     fn what_is_too_small_too_large_too_faint_or_too_long_is_none() {
-        assert_eq!(areas(&image(&[([80.0, 70.0], 5.0, 0.3)]), &Known::Nothing), [0; 0]);
-        assert_eq!(areas(&image(&[([80.0, 70.0], 40.0, 0.3)]), &Known::Nothing), [0; 0]);
-        assert_eq!(areas(&image(&[([80.0, 70.0], 10.0, 0.06)]), &Known::Nothing), [0; 0]);
+        assert_eq!(areas(&image(&[([80.0, 70.0], 5.0, 0.3)]), &NucleiAnnotation::None), [0; 0]);
+        assert_eq!(areas(&image(&[([80.0, 70.0], 40.0, 0.3)]), &NucleiAnnotation::None), [0; 0]);
+        assert_eq!(areas(&image(&[([80.0, 70.0], 10.0, 0.06)]), &NucleiAnnotation::None), [0; 0]);
         let chain: Vec<([f64; 2], f64, f64)> =
             (0..12).map(|i| ([40.0 + 9.0 * f64::from(i), 60.0 + 20.0 * f64::from(i % 2)], 9.0, 0.1)).collect();
-        assert!(areas(&image(&chain), &Known::Nothing).is_empty());
+        assert!(areas(&image(&chain), &NucleiAnnotation::None).is_empty());
     }
 
     #[test]
     fn points_choose_what_is_taken_and_masks_are_taken_as_they_are() {
         let image = image(&[([50.0, 70.0], 10.0, 0.3), ([120.0, 70.0], 12.0, 0.4), ([170.0, 70.0], 10.0, 0.07)]);
-        assert_eq!(areas(&image, &Known::Nothing).len(), 2);
-        assert_eq!(areas(&image, &Known::Points(vec![[121.0, 72.0], [10.0, 10.0]])).len(), 1);
+        assert_eq!(areas(&image, &NucleiAnnotation::None).len(), 2);
+        assert_eq!(areas(&image, &NucleiAnnotation::Points(vec![[121.0, 72.0], [10.0, 10.0]])).len(), 1);
         // Marked nuclei may be fainter.
-        assert_eq!(areas(&image, &Known::Points(vec![[170.0, 70.0]])).len(), 1);
+        assert_eq!(areas(&image, &NucleiAnnotation::Points(vec![[170.0, 70.0]])).len(), 1);
         let mut labels = vec![0; image.len()];
         for y in 20..40 {
             labels[y * 200 + 20..y * 200 + 50].fill(7);
             labels[y * 200 + 60..y * 200 + 65].fill(7);
         }
-        assert_eq!(areas(&image, &Known::Masks(labels)), [600]);
+        assert_eq!(areas(&image, &NucleiAnnotation::Masks(labels)), [600]);
     }
 
     #[test]
     fn neighbours_are_parted() {
         let image = image(&[([60.0, 70.0], 10.0, 0.3), ([84.0, 70.0], 10.0, 0.35)]);
-        assert_eq!(areas(&image, &Known::Nothing).len(), 2);
+        assert_eq!(areas(&image, &NucleiAnnotation::None).len(), 2);
     }
 }

@@ -1,73 +1,90 @@
-//! Features of many things, by name.
+//! Tables of features.
 
 use serde::{Deserialize, Serialize};
 
 use crate::number::single;
 
-/// What a feature tells of.
+/// Kind of a feature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
-pub enum Family {
+pub enum FeatureKind {
     /// Size and outline.
     Shape,
-    /// How dark it is.
-    Stain,
-    /// Its rim: how sharp, how dark, how even.
-    Rim,
-    /// What lies around it.
+    /// Absorbance.
+    Absorbance,
+    /// Border: sharpness, darkness, evenness.
+    Border,
+    /// Surroundings.
     Surroundings,
-    /// Grain and structure inside.
+    /// Texture inside.
     Texture,
-    /// Widths and strengths of edges.
+    /// Width and strength of edges.
     Edges,
-    /// Power at different scales.
+    /// Power at several scales.
     Spectrum,
-    /// Noise of the camera and what became of it.
+    /// Camera noise, as processing left it.
     Noise,
 }
 
-/// A feature's name and what it tells of.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Feature {
-    /// Its name, with its unit where it has one.
-    pub name: String,
-    /// What it tells of.
-    pub family: Family,
+impl FeatureKind {
+    /// Returns the name, as in JSON.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Shape => "shape",
+            Self::Absorbance => "absorbance",
+            Self::Border => "border",
+            Self::Surroundings => "surroundings",
+            Self::Texture => "texture",
+            Self::Edges => "edges",
+            Self::Spectrum => "spectrum",
+            Self::Noise => "noise",
+        }
+    }
 }
 
-/// One row of numbers for each nucleus, cell or patch of a field.
+/// Name and kind of a feature.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Feature {
+    /// Stable identifier, with the unit if there is one. [`describe`](crate::describe) puts it in words.
+    pub name: String,
+    /// Kind.
+    pub kind: FeatureKind,
+}
+
+/// Features of the nuclei, cells or patches of a field: one row each.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Table {
-    /// The columns; none if there is no row.
+pub struct FeatureTable {
+    /// Columns; empty without rows.
     pub features: Vec<Feature>,
-    /// The numbers, row by row; NaN where there is none.
+    /// Values, row by row; NaN if unknown.
     pub values: Vec<f32>,
-    /// Where each row's thing lies: x right, y down, pixels of the measured picture.
+    /// Position of each row's object: x to the right, y downwards, pixels of the measured image.
     pub places: Vec<[f64; 2]>,
 }
 
-impl Table {
-    /// Number of rows.
+impl FeatureTable {
+    /// Returns the number of rows.
     #[must_use]
     pub fn len(&self) -> usize {
         self.places.len()
     }
 
-    /// Whether there is no row.
+    /// Returns whether there is no row.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.places.is_empty()
     }
 
-    /// The numbers of a row.
+    /// Returns the values of a row.
     #[must_use]
     pub fn row(&self, row: usize) -> &[f32] {
         let width = self.features.len();
         &self.values[row * width..(row + 1) * width]
     }
 
-    /// The numbers of a feature that are known, from the first row to the last.
+    /// Returns the known values of a feature, row by row.
     pub fn column(&self, name: &str) -> impl Iterator<Item = f64> {
         let column = self.features.iter().position(|f| f.name == name);
         let values = column.map(|c| self.values[c..].iter().step_by(self.features.len()));
@@ -75,8 +92,8 @@ impl Table {
     }
 }
 
-impl FromIterator<(Row, [f64; 2])> for Table {
-    /// Of rows and their places.
+impl FromIterator<(Row, [f64; 2])> for FeatureTable {
+    /// Collects rows and their positions.
     fn from_iter<I: IntoIterator<Item = (Row, [f64; 2])>>(rows: I) -> Self {
         let mut table = Self::default();
         for (row, place) in rows {
@@ -88,7 +105,7 @@ impl FromIterator<(Row, [f64; 2])> for Table {
     }
 }
 
-/// A row that is being filled.
+/// A row under construction.
 #[derive(Default)]
 pub(crate) struct Row {
     features: Vec<Feature>,
@@ -96,9 +113,9 @@ pub(crate) struct Row {
 }
 
 impl Row {
-    /// Adds a number; what is not finite counts as unknown.
-    pub(crate) fn put(&mut self, family: Family, name: impl Into<String>, value: f64) {
-        self.features.push(Feature { name: name.into(), family });
+    /// Adds a value; it is unknown if it is not finite.
+    pub(crate) fn put(&mut self, kind: FeatureKind, name: impl Into<String>, value: f64) {
+        self.features.push(Feature { name: name.into(), kind });
         self.values.push(if value.is_finite() { single(value) } else { f32::NAN });
     }
 }

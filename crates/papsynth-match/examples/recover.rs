@@ -17,10 +17,10 @@ use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::{Preset, Recipe};
 use papsynth::{Engine, Inputs};
-use papsynth_judge::{NucleiFrom, Picture};
+use papsynth_judge::{FieldImage, NucleiFrom};
 use papsynth_match::{
-    Estimate, MakeEngine, PARAMETERS, Parameter, Plan, Regression, Setting, Source, Spreads, Summary, TableParams,
-    Values, View, WIDEST, measure, recipe, unseen,
+    Estimate, FieldSd, MakeEngine, PARAMETERS, Parameter, Plan, Regression, Setting, Source, Summary, TableParams,
+    Values, WIDEST, WindowSampler, measure, recipe, unseen,
 };
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -68,7 +68,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let seed: u64 = argument(5, &SEED.to_string()).parse()?;
     std::fs::create_dir_all(&folder)?;
 
-    let view = View::new([640, 480], PIXEL_UM, NucleiFrom::Search)?;
+    let view = WindowSampler::new([640, 480], PIXEL_UM, NucleiFrom::Search)?;
     let setting = Setting {
         base: Preset::Lbc.recipe(),
         size_px: view.simulated_px(),
@@ -76,7 +76,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         bits: 8,
         extended: true,
         seek_pixel: false,
-        spreads: Spreads::default(),
+        field_sd: FieldSd::default(),
     };
     // What is measured is known when the table is made: it stays as it is in the table, and differs in trials of its own.
     let mut known = setting.base_values();
@@ -132,7 +132,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// Where trials are made.
 struct Bench<'a> {
-    view: &'a View,
+    view: &'a WindowSampler,
     setting: &'a Setting,
     make: &'a MakeEngine<'a>,
     windows: usize,
@@ -144,9 +144,9 @@ impl Bench<'_> {
         let engine = (self.make)(&recipe(self.setting, values, |_| true)).map_err(|e| e.to_string())?;
         let key = |k: usize| Key { seed: self.seed, index: (row * self.windows + k) as u64 };
         let field = |k: usize| self.view.simulate_field(&engine, key(k)).map_err(|e| e.to_string());
-        let fields: Vec<Picture> = (0..self.windows).map(field).collect::<Result<_, String>>()?;
+        let fields: Vec<FieldImage> = (0..self.windows).map(field).collect::<Result<_, String>>()?;
         let measured = measure(&fields, PIXEL_UM).map_err(|e| e.to_string())?.estimates;
-        let cut: Vec<Picture> = fields.iter().flat_map(|f| self.view.windows(f)).collect();
+        let cut: Vec<FieldImage> = fields.iter().flat_map(|f| self.view.windows(f)).collect();
         let summary = Summary::of(&cut, self.view).map_err(|e| e.to_string())?;
         Ok(Made::new(places, summary, measured))
     }

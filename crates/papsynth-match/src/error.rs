@@ -1,53 +1,60 @@
-//! What is refused.
+//! Errors.
 
-/// Why nothing could be matched.
+/// A match that failed or was stopped.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// There is no picture.
-    #[error("there is no field to match")]
+    /// No images.
+    #[error("no fields; expected 1 or more")]
     NoField,
-    /// A picture of another size than the first, or without light.
+    /// An image of another size than the first one, or a black image.
     #[error("field `{name}` {what}")]
     Field {
-        /// Name of the picture.
+        /// Name of the image.
         name: String,
-        /// What is wrong with it.
+        /// Description of the error.
         what: String,
     },
-    /// There is nothing to learn stain and sizes from.
-    #[error(
-        "{found} nuclei were found in {fields} fields; at least {least} are needed. Is the size of a pixel right ({pixel_um} um)?"
-    )]
+    /// Too few nuclei to estimate stain and sizes.
+    #[error("found {found} nuclei in {fields} fields; expected {least} or more. Check the pixel size ({pixel_um} um)")]
     Nuclei {
-        /// How many there are.
+        /// Number of nuclei.
         found: usize,
-        /// Fields.
+        /// Number of fields.
         fields: usize,
-        /// How many are needed.
+        /// Minimum number of nuclei.
         least: usize,
-        /// Size of a pixel, µm.
+        /// Pixel size, µm.
         pixel_um: f64,
     },
-    /// Most simulated recipes could not be drawn.
-    #[error("only {made} of {asked} simulated recipes could be made: {reason}")]
-    Table {
-        /// How many could.
+    /// Too many simulated recipes failed.
+    #[error("only {made} of {asked} recipes could be simulated: {reason}")]
+    SimulationTable {
+        /// Recipes that could be simulated.
         made: usize,
-        /// How many were tried.
+        /// All recipes.
         asked: usize,
-        /// Why the last one could not.
+        /// Error of the last failed recipe.
         reason: String,
     },
-    /// A parameter is outside its range, or the judge refuses a picture.
+    /// A parameter is out of range, or an image cannot be measured.
     #[error(transparent)]
-    Judge(#[from] papsynth_judge::Error),
-    /// The engine refuses the recipe to begin with.
-    #[error("the recipe to begin with cannot be used: {0}")]
+    Judge(papsynth_judge::Error),
+    /// The engine cannot render a recipe.
+    #[error("the initial recipe cannot be simulated: {0}")]
     Engine(String),
-    /// Someone asked to stop.
+    /// The stop flag was set.
     #[error("stopped")]
     Stopped,
+}
+
+impl From<papsynth_judge::Error> for Error {
+    fn from(error: papsynth_judge::Error) -> Self {
+        match error {
+            papsynth_judge::Error::Stopped => Self::Stopped,
+            other => Self::Judge(other),
+        }
+    }
 }
 
 impl From<papsynth::Error> for Error {

@@ -1,19 +1,19 @@
 //! The whole way: measure, simulate, regress, search.
 
 use papsynth::recipe::{self, Recipe};
-use papsynth_judge::Picture;
+use papsynth_judge::{Control, FieldImage, Phase};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::error::Error;
-use crate::measured::{Measured, measure};
+use crate::measured::{Measured, measure_with};
 use crate::parameter::{PARAMETERS, Parameter, Prior, Source, Values};
 use crate::recipe::{Setting, recipe};
 use crate::refine::{Forward, distance, propose};
 use crate::regression::{Estimate, Regression, WIDEST};
 use crate::summary::{Summary, Window};
-use crate::table::{Plan, Step, Table, TableParams, Tell};
-use crate::view::{MakeEngine, View};
+use crate::table::{Plan, SIMULATING, TableParams};
+use crate::view::{MakeEngine, WindowSampler};
 
 /// Whether the size of a pixel is known.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -38,15 +38,27 @@ impl PixelSize {
 pub struct MatchParams {
     /// Size of a pixel. Default: known, 0.33 µm.
     pub pixel: PixelSize,
-    /// Simulated recipes and windows of each; of fewer real fields, as many windows as there are fields.
-    pub table: TableParams,
-    /// Rounds of the search, 0 to 1000. Default 6.
+    /// Windows to simulate before the search, 60 to 1000000. Default 2000.
+    pub simulations: usize,
+    /// Windows of each simulated recipe, 1 to 1000; at most the number of real fields. Default 8.
+    pub windows: usize,
+    /// Rounds of the search, 0 to 1000. Default 8.
     pub rounds: usize,
+    /// Seed of all random draws. Default 0.
+    pub seed: u64,
+}
+
+impl MatchParams {
+    /// Returns parameters for a first look: a sixth of the simulations, wider intervals, fewer identified parameters.
+    #[must_use]
+    pub fn quick() -> Self {
+        Self { simulations: 336, rounds: 3, ..Self::default() }
+    }
 }
 
 impl Default for MatchParams {
     fn default() -> Self {
-        Self { pixel: PixelSize::Known(0.33), table: TableParams::default(), rounds: 6 }
+        Self { pixel: PixelSize::Known(0.33), simulations: 2000, windows: 8, rounds: 8, seed: 0 }
     }
 }
 
@@ -64,7 +76,7 @@ pub enum Origin {
 
 /// What was found of a parameter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Answer {
+pub struct ParameterFit {
     /// Which.
     pub parameter: Parameter,
     /// Its fields in the recipe.
@@ -85,7 +97,7 @@ pub struct Answer {
     pub width: f64,
 }
 
-impl Answer {
+impl ParameterFit {
     /// A value of which nothing more is known than its range.
     pub(crate) fn new(parameter: Parameter, origin: Origin, value: f64) -> Self {
         let Prior { path, unit, low, high, .. } = parameter.prior();
@@ -127,7 +139,7 @@ pub struct Fit {
     #[serde(skip)]
     pub recipe: Recipe,
     /// Every parameter.
-    pub answers: Vec<Answer>,
+    pub parameters: Vec<ParameterFit>,
     /// How near it comes.
     pub distance: Distance,
     /// Every statistic.
@@ -151,7 +163,10 @@ pub struct Match {
     base: Recipe,
 }
 
-/// Fewest nuclei that stain and sizes are learnt from.
+/// Minimum number of recipes of the table.
+const LEAST_RECIPES: usize = 30;
+
+/// Minimum number of nuclei to estimate stain and sizes.
 const LEAST_NUCLEI: usize = 8;
 
 /// Seeds of the search and of the last comparison, apart from that of the table.
@@ -165,6 +180,8 @@ impl Match {
     /// If a parameter is out of its range.
     pub fn new(params: &MatchParams, base: &Recipe) -> Result<Self, Error> {
         papsynth_judge::Error::check(&[
+            ("simulations", params.simulations as f64, [60.0, 1e6], "60 to 1000000"),
+            ("windows", params.windows as f64, [1.0, 1e3], "1 to 1000"),
             ("rounds", params.rounds as f64, [0.0, 1e3], "0 to 1000"),
             ("pixel_um", params.pixel.um(), [0.05, 4.0], "0.05 to 4"),
         ])?;
@@ -174,7 +191,7 @@ impl Match {
     /// The setting of fields and what is known beforehand of their values.
     fn setting(&self, measured: &Measured) -> (Setting, Values) {
         // Pictures of extended focus have more than their noise in common.
-        let fused = measured.extended && self.base.focus.picture == recipe::Picture::Planes;
+        let fused = measured.extended && self.base.focus.output == recipe::FocusOutput::Planes;
         let setting = Setting {
             base: if fused { self.base.clone().fused() } else { self.base.clone() },
             size_px: measured.size_px,
@@ -182,7 +199,7 @@ impl Match {
             bits: measured.bits,
             extended: measured.extended,
             seek_pixel: matches!(self.params.pixel, PixelSize::Sought(_)),
-            spreads: measured.spreads,
+            field_sd: measured.field_sd,
         };
         let mut known = setting.base_values();
         for (parameter, estimate) in &measured.estimates {
@@ -191,16 +208,20 @@ impl Match {
         (setting, known)
     }
 
-    /// Finds the recipe of fields. The same for the same seed, whatever the threads. `tell` hears how far the work is and stops it by
-    /// false.
+    /// Finds the recipe of real fields. The result does not depend on the number of threads.
+    ///
+    /// The phases of the progress reports are "measuring fields", "measuring windows", "simulating fields", "fitting regressions"
+    /// and "searching, distance …". The last one continues the count of "simulating fields", so the time of the first simulations
+    /// gives the remaining time of the complete match, except for the seconds of "fitting regressions".
     ///
     /// # Errors
-    /// If the fields are none or show nothing, recipes cannot be made, or `tell` says stop.
-    pub fn run(&self, fields: &[Picture], make: &MakeEngine<'_>, tell: &Tell<'_>) -> Result<Fit, Error> {
-        let measured = measure(fields, self.params.pixel.um())?;
-        let view = View::new(measured.size_px, self.params.pixel.um(), measured.nuclei_from)?;
-        let pictures: Vec<Picture> = fields.iter().flat_map(|f| view.windows(f)).collect();
-        let windows = Window::all(&pictures, &view)?;
+    /// If there are no fields, or too few nuclei in them, or recipes cannot be simulated; [`Error::Stopped`] if the stop flag is
+    /// set.
+    pub fn run(&self, fields: &[FieldImage], make: &MakeEngine<'_>, control: &Control) -> Result<Fit, Error> {
+        let measured = measure_with(fields, self.params.pixel.um(), control)?;
+        let view = WindowSampler::new(measured.size_px, self.params.pixel.um(), measured.nuclei_from)?;
+        let pictures: Vec<FieldImage> = fields.iter().flat_map(|f| view.windows(f)).collect();
+        let windows = Window::all(&pictures, &view, control)?;
         let nuclei = windows.iter().map(Window::nuclei).sum();
         if nuclei < LEAST_NUCLEI {
             let pixel_um = self.params.pixel.um();
@@ -209,20 +230,24 @@ impl Match {
         let real = Summary::new(&windows);
 
         let (setting, known) = self.setting(&measured);
-        let of_table =
-            TableParams { windows: self.params.table.windows.min(fields.len()), ..self.params.table.clone() };
-        let plan = Plan::new(&setting, &known, &view, make, &of_table)?;
-        let table = plan.simulate(tell)?;
-        let estimates = Regression::new(&table.statistics, &table.places).estimate(&real.values);
-        let search = Search { plan: &plan, measured: &measured, table: &table, estimates };
-        let (places, distance, statistics) = search.run(&real, self.params.rounds, tell)?;
-        let answers = search.answers(&places);
+        let per_recipe = self.params.windows.min(fields.len());
+        let recipes = (self.params.simulations / per_recipe).max(LEAST_RECIPES);
+        let params = TableParams { recipes, windows: per_recipe, seed: self.params.seed };
+        let plan = Plan::new(&setting, &known, &view, make, &params)?;
+        let total = plan.windows() + Search::simulations(&plan, self.params.rounds);
+        let table = plan.simulate_in(&control.phase(SIMULATING, total))?;
+        let regression = Regression::new_with(&table.statistics, &table.places, control)?;
+        let estimates = regression.estimate(&real.values);
+        let forward = Forward::new(&table, control)?;
+        let search = Search { plan: &plan, measured: &measured, forward, estimates, control, total };
+        let (places, distance, statistics) = search.run(&real, self.params.rounds)?;
+        let parameters = search.parameters(&places);
         let fitted = |parameter: Parameter| {
-            answers.iter().any(|a| a.parameter == parameter && a.origin != Origin::NotIdentified)
+            parameters.iter().any(|a| a.parameter == parameter && a.origin != Origin::NotIdentified)
         };
         Ok(Fit {
             recipe: recipe(&setting, &plan.values(&places), fitted),
-            answers,
+            parameters,
             distance,
             statistics,
             fields: fields.len(),
@@ -238,14 +263,26 @@ impl Match {
 struct Search<'a> {
     plan: &'a Plan<'a>,
     measured: &'a Measured,
-    table: &'a Table,
+    forward: Forward,
     estimates: Vec<Estimate>,
+    control: &'a Control<'a>,
+    /// Simulations of the table and of the search.
+    total: usize,
 }
 
 /// Places of all sought parameters, how near they come, and every statistic.
 type Found = (Vec<f64>, Distance, Vec<Statistic>);
 
 impl Search<'_> {
+    /// Returns the number of simulations of a search: one start, its rounds and three final comparisons.
+    fn simulations(plan: &Plan, rounds: usize) -> usize {
+        (rounds + 4) * Self::windows(plan)
+    }
+
+    fn windows(plan: &Plan) -> usize {
+        plan.params.windows.max(2)
+    }
+
     fn identified(&self, parameter: Parameter) -> bool {
         match parameter.prior().source {
             Source::Measured => self.measured.get(parameter).is_some_and(|e| width_of_value(parameter, &e) <= WIDEST),
@@ -256,16 +293,21 @@ impl Search<'_> {
         }
     }
 
-    fn simulate(&self, places: &[f64], fitted: impl Fn(Parameter) -> bool + Sync, seed: u64) -> Result<Summary, Error> {
+    fn simulate(
+        &self,
+        places: &[f64],
+        fitted: impl Fn(Parameter) -> bool + Sync,
+        seed: u64,
+        phase: &Phase,
+    ) -> Result<Summary, Error> {
         let engine = self.plan.engine(places, fitted)?;
-        let count = self.plan.params.windows.max(2);
-        let made = (0..count).into_par_iter().map(|index| self.plan.window(&engine, seed, index));
+        let indices = (0..Self::windows(self.plan)).into_par_iter();
+        let made = indices.map(|index| self.plan.window(&engine, seed, index, phase));
         Ok(Summary::new(&made.collect::<Vec<_>>().into_iter().collect::<Result<Vec<_>, _>>()?))
     }
 
-    fn run(&self, real: &Summary, rounds: usize, tell: &Tell<'_>) -> Result<Found, Error> {
+    fn run(&self, real: &Summary, rounds: usize) -> Result<Found, Error> {
         let (sought, seed) = (self.plan.sought(), self.plan.params.seed);
-        let forward = Forward::new(self.table);
         let base = self.plan.setting.base_values();
         let fitted = |parameter: Parameter| self.identified(parameter);
         let all = sought.iter().zip(self.estimates.iter().copied());
@@ -275,17 +317,22 @@ impl Search<'_> {
         let start: Vec<f64> = all
             .map(|(p, e)| if fitted(*p) { e.value } else { p.prior().place(base.get(*p)).clamp(0.0, 1.0) })
             .collect();
-        let apart = |s: &Summary| forward.apart(&real.values, &s.values);
-        let seen = self.simulate(&start, fitted, seed ^ SEARCH)?;
+        let apart = |s: &Summary| self.forward.apart(&real.values, &s.values);
+        let phase = self.control.resume("searching", self.plan.windows(), self.total);
+        let seen = self.simulate(&start, fitted, seed ^ SEARCH, &phase)?;
+        let mut done = phase.done();
         let mut best = (start.clone(), distance(&apart(&seen)), seen);
         let mut towards: Option<Vec<f64>> = None;
-        for round in 0..rounds {
+        for _ in 0..rounds {
             let next = match &towards {
                 // A step that led away is halved.
                 Some(failed) => failed.iter().zip(&best.0).map(|(a, b)| 0.5 * (a + b)).collect(),
-                None => propose(&forward, [&real.values, &best.2.values], &best.0, &moving),
+                None => propose(&self.forward, [&real.values, &best.2.values], &best.0, &moving),
             };
-            let seen = self.simulate(&next, fitted, seed ^ SEARCH)?;
+            let name = format!("searching, distance {:.2}", best.1);
+            let phase = self.control.resume(&name, done, self.total);
+            let seen = self.simulate(&next, fitted, seed ^ SEARCH, &phase)?;
+            done = phase.done();
             let found = distance(&apart(&seen));
             if found < best.1 {
                 best = (next, found, seen);
@@ -293,14 +340,13 @@ impl Search<'_> {
             } else {
                 towards = Some(next);
             }
-            if !tell(Step::Searched(round + 1, rounds, best.1)) {
-                return Err(Error::Stopped);
-            }
         }
         // The last comparison is on windows that the search has not seen.
-        let before = self.simulate(&start, |_| false, seed ^ LAST)?;
-        let estimated = distance(&apart(&self.simulate(&start, fitted, seed ^ LAST)?));
-        let after = self.simulate(&best.0, fitted, seed ^ LAST)?;
+        let name = format!("searching, distance {:.2}", best.1);
+        let phase = self.control.resume(&name, done, self.total);
+        let before = self.simulate(&start, |_| false, seed ^ LAST, &phase)?;
+        let estimated = distance(&apart(&self.simulate(&start, fitted, seed ^ LAST, &phase)?));
+        let after = self.simulate(&best.0, fitted, seed ^ LAST, &phase)?;
         let off = apart(&after);
         let told = Distance { before: distance(&apart(&before)), estimated, after: distance(&off) };
         let statistic = |i: usize| Statistic {
@@ -313,7 +359,7 @@ impl Search<'_> {
         Ok((best.0, told, (0..real.names.len()).map(statistic).collect()))
     }
 
-    fn answers(&self, places: &[f64]) -> Vec<Answer> {
+    fn parameters(&self, places: &[f64]) -> Vec<ParameterFit> {
         let base = self.plan.setting.base_values();
         let sought = PARAMETERS.into_iter().filter(|p| self.plan.setting.seeks(*p));
         let one = |parameter: Parameter| {
@@ -334,7 +380,7 @@ impl Search<'_> {
             };
             let before = base.get(parameter);
             let value = if origin == Origin::NotIdentified { before } else { value };
-            Answer { interval, before, width, ..Answer::new(parameter, origin, value) }
+            ParameterFit { interval, before, width, ..ParameterFit::new(parameter, origin, value) }
         };
         sought.map(one).collect()
     }

@@ -15,11 +15,11 @@ mod text;
 mod view;
 
 pub use error::Error;
-pub use fit::{Answer, Distance, Fit, Match, MatchParams, Origin, PixelSize, Statistic};
-pub use measured::{Measured, measure};
+pub use fit::{Distance, Fit, Match, MatchParams, Origin, ParameterFit, PixelSize, Statistic};
+pub use measured::{Measured, measure, measure_with};
 pub use parameter::{PARAMETERS, Parameter, Prior, Scale, Source, Values};
-pub use recipe::{Setting, Spreads, recipe};
+pub use recipe::{FieldSd, Setting, recipe};
 pub use regression::{Estimate, Regression, WIDEST};
 pub use summary::Summary;
-pub use table::{Plan, Step, Table, TableParams, unseen};
-pub use view::{MakeEngine, View};
+pub use table::{Plan, SimulationTable, TableParams, unseen};
+pub use view::{MakeEngine, WindowSampler};

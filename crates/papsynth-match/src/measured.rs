@@ -1,14 +1,14 @@
 //! What a statistic of real fields says by itself: light, noise, bits.
 
-use papsynth_judge::{NucleiFrom, Picture};
+use papsynth_judge::{Control, FieldImage, NucleiFrom};
 use rayon::prelude::*;
 
 use crate::error::Error;
 use crate::noise::{Empty, pattern};
 use crate::parameter::Parameter;
-use crate::recipe::{LEVELS, Spreads};
-use crate::regression::{Estimate, reach};
-use crate::view::View;
+use crate::recipe::{FieldSd, LEVELS};
+use crate::regression::{Estimate, min_max};
+use crate::view::WindowSampler;
 use portable_numerics::statistics::{deviation, mean, quantile};
 
 /// A slide darker than this, of 255, is none.
@@ -56,7 +56,7 @@ pub struct Measured {
     /// Parameters with their 95 % intervals; not here is what could not be told.
     pub estimates: Vec<(Parameter, Estimate)>,
     /// Standard deviations between fields.
-    pub spreads: Spreads,
+    pub field_sd: FieldSd,
 }
 
 impl Measured {
@@ -80,7 +80,15 @@ struct Light {
 ///
 /// # Errors
 /// If there is no field, one is black, or they are of different sizes.
-pub fn measure(fields: &[Picture], pixel_um: f64) -> Result<Measured, Error> {
+pub fn measure(fields: &[FieldImage], pixel_um: f64) -> Result<Measured, Error> {
+    measure_with(fields, pixel_um, &Control::NONE)
+}
+
+/// As [`measure`], with progress reports and a stop flag. The phase is "measuring fields".
+///
+/// # Errors
+/// As `measure`; [`Error::Stopped`] if the stop flag is set.
+pub fn measure_with(fields: &[FieldImage], pixel_um: f64, control: &Control) -> Result<Measured, Error> {
     let first = fields.first().ok_or(Error::NoField)?;
     let size_px = [first.width, first.height()];
     for field in fields {
@@ -103,9 +111,15 @@ pub fn measure(fields: &[Picture], pixel_um: f64) -> Result<Measured, Error> {
     // Points are of those nuclei that somebody took an interest in: simulated windows know all of theirs.
     let masks = fields.iter().all(|field| NucleiFrom::of(&field.nuclei) == NucleiFrom::Masks);
     let nuclei_from = if masks { NucleiFrom::Masks } else { NucleiFrom::Search };
-    let view = View::new(size_px, pixel_um, nuclei_from)?;
+    let view = WindowSampler::new(size_px, pixel_um, nuclei_from)?;
     let scale = f64::from(first.full_scale);
-    let lights: Vec<Result<Light, Error>> = fields.par_iter().map(|field| light(field, &view)).collect();
+    let phase = control.phase("measuring fields", fields.len());
+    let one = |field: &FieldImage| -> Result<Light, Error> {
+        let light = light(field, &view, control)?;
+        phase.step()?;
+        Ok(light)
+    };
+    let lights: Vec<Result<Light, Error>> = fields.par_iter().map(one).collect();
     let lights: Vec<Light> = lights.into_iter().collect::<Result<_, _>>()?;
     let column = |f: &dyn Fn(&Light) -> f64| -> Vec<f64> { lights.iter().map(f).filter(|v| v.is_finite()).collect() };
     let shared = [0, 1].map(|i| column(&|l| l.empty.shared[i]));
@@ -133,7 +147,7 @@ pub fn measure(fields: &[Picture], pixel_um: f64) -> Result<Measured, Error> {
     // What lies on a slide adds to its noise and changes what is shared: by how much is seen in how fields differ.
     if extended {
         for (parameter, values) in [(Parameter::Across, &shared[0]), (Parameter::Down, &shared[1])] {
-            let [low, high] = reach(values);
+            let [low, high] = min_max(values);
             put(parameter, values, CORRELATION_ERROR + ADDED_SHARE * added + 0.25 * (high - low));
         }
     }
@@ -143,7 +157,7 @@ pub fn measure(fields: &[Picture], pixel_um: f64) -> Result<Measured, Error> {
         let half = of_mean(deviation(&noise), noise.len()) + NOISE_ERROR + added;
         let prior = Parameter::Noise.prior();
         let [value, mut low, high] = [0.0, -half, half].map(|d| libm::exp(mean(&noise) + d));
-        low = low.min(libm::exp(reach(&noise)[0] - NOISE_ERROR));
+        low = low.min(libm::exp(min_max(&noise)[0] - NOISE_ERROR));
         estimates.push((
             Parameter::Noise,
             Estimate { value, low: low.max(prior.low).min(value), high: high.min(prior.high).max(value) },
@@ -152,9 +166,9 @@ pub fn measure(fields: &[Picture], pixel_um: f64) -> Result<Measured, Error> {
     if levels.len() > 1 {
         let sd = deviation(&levels);
         let [low, high] = of_deviation(levels.len()).map(|factor| factor * sd);
-        let most = Parameter::LevelSpread.prior().high;
+        let most = Parameter::LevelSd.prior().high;
         estimates.push((
-            Parameter::LevelSpread,
+            Parameter::LevelSd,
             Estimate { value: sd, low: (low - level_error).max(0.0), high: (high + level_error).min(most.max(sd)) },
         ));
     }
@@ -162,27 +176,28 @@ pub fn measure(fields: &[Picture], pixel_um: f64) -> Result<Measured, Error> {
     let squares = mean(&column(&|l| l.level * l.level)) * scale * scale;
     let restored = mean(&column(&|l| l.empty.restored()));
     let relative: Vec<Vec<f32>> = lights.into_iter().map(|l| l.empty.relative).collect();
-    if let Some([variance, error]) = pattern(&relative).map(|found| found.map(|v| v * restored)) {
+    if let Some([variance, error]) = pattern(&relative, control)?.map(|found| found.map(|v| v * restored)) {
         let per_noise = squares / mean(&variances);
         let half = (2.0 * error + PATTERN_ERROR * variance.abs()) * per_noise;
         let [value, low, mut high] = [0.0, -half, half].map(|d| (variance * per_noise + d).clamp(0.0, 1.0));
         // Of the noise of the cleanest field it is a larger part.
-        high = (high * (mean(&variances) / reach(&variances)[0] + added)).clamp(value, 1.0);
+        high = (high * (mean(&variances) / min_max(&variances)[0] + added)).clamp(value, 1.0);
         estimates.push((Parameter::Pattern, Estimate { value, low, high }));
     }
     estimates.sort_by_key(|(parameter, _)| *parameter);
     let or_default = |sd: f64, default: f64| if sd.is_finite() { sd } else { default };
-    let usual = Spreads::default();
-    let spreads = Spreads {
+    let usual = FieldSd::default();
+    let field_sd = FieldSd {
         across: or_default(sd_across, usual.across),
         down: or_default(sd_down, usual.down),
         noise: or_default(deviation(&noise), usual.noise),
     };
-    Ok(Measured { size_px, bits: bits(fields), extended, nuclei_from, estimates, spreads })
+    Ok(Measured { size_px, bits: bits(fields), extended, nuclei_from, estimates, field_sd })
 }
 
-fn light(field: &Picture, view: &View) -> Result<Light, Error> {
-    let s = view.gauge.measure(field)?.statistics;
+fn light(field: &FieldImage, view: &WindowSampler, control: &Control) -> Result<Light, Error> {
+    let s = view.measurer.measure_with(field, control)?.statistics;
+    control.check()?;
     let (across, down) = (-s.background_x2, -s.background_y2);
     let middle = s.background_dn / (1.0 - MEAN_SQUARE * (across + down));
     let grey = s.background_dn * f64::from(field.full_scale) / LEVELS;
@@ -196,7 +211,7 @@ fn light(field: &Picture, view: &View) -> Result<Light, Error> {
 }
 
 /// The fewest bits that hold all grey levels; 8 where pictures are fractions.
-fn bits(fields: &[Picture]) -> u32 {
+fn bits(fields: &[FieldImage]) -> u32 {
     let scale = fields.iter().map(|f| f.full_scale).fold(0.0_f32, f32::max);
     (8..16).find(|bits| f64::from(scale) <= libm::exp2(f64::from(*bits))).unwrap_or(16)
 }
@@ -247,7 +262,7 @@ mod tests {
     fn fields_of_one_size_and_pixels_with_a_size_are_asked_for() {
         let two = [("a", 128), ("b", 96)].map(|(name, width)| {
             let grey = (0..width * 96).map(|i| 200.0 + (i % 3) as f32).collect();
-            Picture { name: name.to_owned(), grey, width, ..Picture::default() }
+            FieldImage { name: name.to_owned(), grey, width, ..FieldImage::default() }
         });
         let error = measure(&two, 0.33).unwrap_err().to_string();
         assert!(error.contains("field `b` is 96 x 96") && error.contains("128 x 96"), "{error}");

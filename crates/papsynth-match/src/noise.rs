@@ -1,5 +1,7 @@
 //! Noise beyond that of the empty slide, how uneven light is, and small things: how many there are of each size and darkness.
 
+use crate::error::Error;
+use papsynth_judge::Control;
 use papsynth_judge::filter::separable;
 use papsynth_judge::number::{single, whole};
 use portable_numerics::statistics::{deviation, mean, quantile};
@@ -180,17 +182,18 @@ impl Empty {
 const LEAST_PIXELS: usize = 5000;
 
 /// Mean over pairs of fields of the relative variance that they share, with its standard error; none of fields without common slide.
-pub(crate) fn pattern(fields: &[Vec<f32>]) -> Option<[f64; 2]> {
+pub(crate) fn pattern(fields: &[Vec<f32>], control: &Control) -> Result<Option<[f64; 2]>, Error> {
     let mut products = Vec::new();
     for (i, a) in fields.iter().enumerate() {
         for b in &fields[i + 1..] {
+            control.check()?;
             products.extend(Some(mean_product(a, b, LEAST_PIXELS)).filter(|product| product.is_finite()));
         }
     }
     let pairs = products.len();
     // Pairs share fields: as many are independent as there are fields.
     let sd = if pairs > 1 { deviation(&products) } else { mean(&products).abs() };
-    (pairs > 0).then(|| [mean(&products), sd / (fields.len().min(pairs) as f64).sqrt()])
+    Ok((pairs > 0).then(|| [mean(&products), sd / (fields.len().min(pairs) as f64).sqrt()]))
 }
 
 /// Scales at which small things are sought, pixels.
@@ -300,10 +303,11 @@ mod tests {
             Empty::new(&grey, width, 220.0)
         };
         let fields = [field(2), field(3), field(4)];
-        let [variance, error] = pattern(&fields.each_ref().map(|f| f.relative.clone())).unwrap();
+        let [variance, error] =
+            pattern(&fields.each_ref().map(|f| f.relative.clone()), &Control::NONE).unwrap().unwrap();
         // 1.2·10⁵ pixels: 5·10⁻⁷ of error, the pattern's own chance included.
         assert!((variance * fields[0].restored() - 1e-4).abs() < 1.5e-6, "{variance} {error}");
-        assert_eq!(pattern(&[fields[0].relative.clone()]), None);
+        assert_eq!(pattern(&[fields[0].relative.clone()], &Control::NONE), Ok(None));
         // 2 and a hundredth of 220, on 1.2·10⁵ pixels.
         assert!((fields[0].deviation / (4.0_f64 + 4.84).sqrt() - 1.0).abs() < 0.02, "{}", fields[0].deviation);
         assert!(fields[0].shared.iter().all(|s| s.abs() < 0.02), "{:?}", fields[0].shared);

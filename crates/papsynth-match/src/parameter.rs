@@ -69,19 +69,19 @@ parameters! {
     /// Mean light of the empty slide, a part of full scale: what scatter takes, half its strength, is off.
     Level: Measured, Linear 0.55..1.0 "", "background.level: mean light";
     /// Its standard deviation between fields.
-    LevelSpread: Measured, Linear 0.0..0.04 "", "background.level: sd";
+    LevelSd: Measured, Linear 0.0..0.04 "", "background.level: sd";
     /// Fall of the light towards the left and right border.
-    BowlAcross: Measured, Linear 0.0..0.12 "", "background.illumination.x2: mean";
+    BowlAcross: Measured, Linear 0.0..0.12 "", "background.illumination.falloff_x: mean";
     /// Towards the upper and lower border.
-    BowlDown: Measured, Linear 0.0..0.12 "", "background.illumination.y2: mean";
+    BowlDown: Measured, Linear 0.0..0.12 "", "background.illumination.falloff_y: mean";
     /// Standard deviation of all noise of the empty slide, levels of 8 bits.
     Noise: Measured, Logarithmic 0.5..6.0 "dn", "camera.full_well_e, camera.read_noise_e: noise of the empty slide";
     /// Part of its variance that is the same in every picture.
     Pattern: Measured, Linear 0.0..0.8 "", "camera.prnu: part of the variance of noise";
     /// Noise shared with the next pixel of the row, in a fused picture.
-    Across: Measured, Linear 0.0..0.45 "", "focus.fused_noise_across";
+    Across: Measured, Linear 0.0..0.45 "", "focus.noise_correlation_x";
     /// With the next pixel of the column.
-    Down: Measured, Linear 0.0..0.45 "", "focus.fused_noise_down";
+    Down: Measured, Linear 0.0..0.45 "", "focus.noise_correlation_y";
     /// Size of a pixel; sought only where it is asked for.
     Pixel: Simulated, Logarithmic 0.15..0.75 "um", "field.pixel_um";
     /// Part of the noise of the empty slide, without its fixed pattern, that is that of photons.
@@ -89,21 +89,21 @@ parameters! {
     /// Spread of light beyond diffraction, median over fields.
     Blur: Simulated, Logarithmic 0.08..0.9 "um", "optics.extra_blur_um: median";
     /// Standard deviation of its logarithm between fields.
-    BlurSpread: Simulated, Linear 0.0..0.4 "", "optics.extra_blur_um: log sd";
+    BlurSd: Simulated, Linear 0.0..0.4 "", "optics.extra_blur_um: log sd";
     /// Depth over which cells lie.
     Depth: Simulated, Logarithmic 0.5..12.0 "um", "slide.depth_um";
     /// Stain of all cytoplasm of a field, median over fields.
     FieldCytoplasm: Simulated, Logarithmic 0.35..2.5 "", "stain.field_cytoplasm: median";
     /// Standard deviation of its logarithm between fields.
-    FieldCytoplasmSpread: Simulated, Linear 0.02..0.7 "", "stain.field_cytoplasm: log sd";
+    FieldCytoplasmSd: Simulated, Linear 0.02..0.7 "", "stain.field_cytoplasm: log sd";
     /// Stain of all nuclei of a field, median over fields.
     FieldNucleus: Simulated, Logarithmic 0.35..2.0 "", "stain.field_nucleus: median";
     /// Standard deviation of its logarithm between fields.
-    FieldNucleusSpread: Simulated, Linear 0.02..0.4 "", "stain.field_nucleus: log sd";
+    FieldNucleusSd: Simulated, Linear 0.02..0.4 "", "stain.field_nucleus: log sd";
     /// Contrast of chromatin, median over fields.
     Texture: Simulated, Logarithmic 0.15..2.5 "", "stain.field_texture: median";
     /// Standard deviation of its logarithm between fields.
-    TextureSpread: Simulated, Linear 0.02..0.7 "", "stain.field_texture: log sd";
+    TextureSd: Simulated, Linear 0.02..0.7 "", "stain.field_texture: log sd";
     /// Standard deviation of the logarithm of the cytoplasm's stain between cells, beyond that of the model.
     CellCytoplasm: Simulated, Linear 0.0..0.7 "", "cells.*.cytoplasm_stain: log sd";
     /// Of that of nuclei.
@@ -117,7 +117,7 @@ parameters! {
     /// Cells, median over fields.
     Cells: Simulated, Logarithmic 40.0..700.0 "/mm2", "cells.*.count: median";
     /// Standard deviation of the logarithm of their number between fields.
-    CellsSpread: Simulated, Linear 0.05..0.9 "", "cells.*.count: log sd";
+    CellsSd: Simulated, Linear 0.05..0.9 "", "cells.*.count: log sd";
     /// Share of superficial among superficial and intermediate cells.
     Superficial: Simulated, Linear 0.02..0.98 "", "cells.superficial.count: share";
     /// Factor on the size of cells with their nuclei.
@@ -135,9 +135,9 @@ parameters! {
     /// Amorphous clumps.
     Smudges: Simulated, Logarithmic 6.0..800.0 "/mm2", "debris.smudges.count: median";
     /// Drifts of faint dirt.
-    Dirt: Simulated, Logarithmic 12.0..1500.0 "/mm2", "debris.dirt.drifts: median";
+    Dirt: Simulated, Logarithmic 12.0..1500.0 "/mm2", "debris.dirt.clusters: median";
     /// Unevenness of the light.
-    Scatter: Simulated, Logarithmic 0.002..0.06 "", "background.scatter: mean";
+    Scatter: Simulated, Logarithmic 0.002..0.06 "", "background.texture: mean";
 }
 
 impl Parameter {

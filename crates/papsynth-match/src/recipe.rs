@@ -1,7 +1,8 @@
 //! From values of parameters to a recipe, and back.
 
 use papsynth::recipe::{
-    Bowl, CellMix, Clusters, Gaussians, Illumination, Law, Layout, Microscope, Number, Optics, Picture, Preset, Recipe,
+    Abundance, CellMix, Clusters, FocusOutput, Gaussians, Illumination, Law, Layout, Microscope, Number, Optics,
+    Preset, Quadratic, Recipe,
 };
 
 use crate::parameter::{PARAMETERS, Parameter as P, Source, Values};
@@ -22,12 +23,12 @@ pub struct Setting {
     /// Whether the size of a pixel is sought.
     pub seek_pixel: bool,
     /// Standard deviations between fields that were measured beside their means.
-    pub spreads: Spreads,
+    pub field_sd: FieldSd,
 }
 
 /// Standard deviations between fields.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Spreads {
+pub struct FieldSd {
     /// Of the bowl across.
     pub across: f64,
     /// Of the bowl down.
@@ -36,7 +37,7 @@ pub struct Spreads {
     pub noise: f64,
 }
 
-impl Default for Spreads {
+impl Default for FieldSd {
     fn default() -> Self {
         Self { across: 0.008, down: 0.008, noise: 0.03 }
     }
@@ -70,19 +71,19 @@ impl Setting {
     pub fn base_values(&self) -> Values {
         let base = &self.base;
         let area = base_area(base);
-        let level = centre(&base.background.level) - TAKEN * centre(&base.background.scatter);
+        let level = centre(&base.background.level) - TAKEN * centre(&base.background.texture);
         let (x2, y2) = match &base.background.illumination {
-            Illumination::Bowl(Bowl { x2, y2, .. }) => (centre(x2), centre(y2)),
+            Illumination::Quadratic(Quadratic { falloff_x, falloff_y, .. }) => (centre(falloff_x), centre(falloff_y)),
             Illumination::Border(_) => (0.0, 0.0),
         };
         let camera = &base.camera;
-        let glare = centre(&camera.glare_removed);
+        let glare = centre(&camera.glare_subtracted);
         let signal = signal(level, glare);
         let per_dn = centre(&camera.full_well_e) * (1.0 - glare) / LEVELS;
         let (photons, read) = (signal / per_dn, centre(&camera.read_noise_e) / per_dn);
         let pattern = centre(&camera.prnu) * signal;
         let noise = photons + read * read + pattern * pattern + ROUNDING;
-        let counts: f64 = base.cells.values().map(|mix| centre(&mix.count)).sum();
+        let counts: f64 = base.cells.values().map(|mix| density(&mix.count, area)).sum();
         let [superficial, intermediate] = of_pair(base);
         let both = |a: &Number, b: &Number| (spread(a) * spread(a) + spread(b) * spread(b)).sqrt();
         let first = base.cells.values().next();
@@ -97,41 +98,41 @@ impl Setting {
         let mut values = Values([0.0; PARAMETERS.len()]);
         for (parameter, value) in [
             (P::Level, level),
-            (P::LevelSpread, spread(&base.background.level) * centre(&base.background.level)),
+            (P::LevelSd, spread(&base.background.level) * centre(&base.background.level)),
             (P::BowlAcross, x2),
             (P::BowlDown, y2),
             (P::Noise, noise.sqrt()),
             (P::Pattern, pattern * pattern / noise),
-            (P::Across, centre(&base.focus.fused_noise_across)),
-            (P::Down, centre(&base.focus.fused_noise_down)),
+            (P::Across, centre(&base.focus.noise_correlation_x)),
+            (P::Down, centre(&base.focus.noise_correlation_y)),
             (P::Pixel, centre(&base.field.pixel_um)),
             (P::Photons, photons / (photons + read * read).max(1e-9)),
             (P::Blur, centre(blur)),
-            (P::BlurSpread, spread(blur)),
+            (P::BlurSd, spread(blur)),
             (P::Depth, centre(&base.slide.depth_um)),
             (P::FieldCytoplasm, centre(&base.stain.field_cytoplasm) * centre(&base.stain.slide_cytoplasm)),
-            (P::FieldCytoplasmSpread, both(&base.stain.field_cytoplasm, &base.stain.slide_cytoplasm)),
+            (P::FieldCytoplasmSd, both(&base.stain.field_cytoplasm, &base.stain.slide_cytoplasm)),
             (P::FieldNucleus, centre(&base.stain.field_nucleus) * centre(&base.stain.slide_nucleus)),
-            (P::FieldNucleusSpread, both(&base.stain.field_nucleus, &base.stain.slide_nucleus)),
+            (P::FieldNucleusSd, both(&base.stain.field_nucleus, &base.stain.slide_nucleus)),
             (P::Texture, centre(&base.stain.field_texture)),
-            (P::TextureSpread, spread(&base.stain.field_texture)),
+            (P::TextureSd, spread(&base.stain.field_texture)),
             (P::CellCytoplasm, spread(&of_cells(|mix| &mix.cytoplasm_stain))),
             (P::CellNucleus, spread(&of_cells(|mix| &mix.nucleus_stain))),
             (P::Dome, centre(&base.nucleus.dome)),
             (P::Rim, centre(&base.nucleus.rim)),
             (P::Structure, 1.0),
-            (P::Cells, counts / area),
-            (P::CellsSpread, first.map_or(0.3, |mix| spread(&mix.count))),
+            (P::Cells, counts),
+            (P::CellsSd, first.map_or(0.3, |mix| spread(mix.count.number()))),
             (P::Superficial, superficial / (superficial + intermediate).max(1e-9)),
             (P::Size, centre(&of_cells(|mix| &mix.size))),
             (P::ClusterRadius, radius),
             (P::Outside, outside),
-            (P::Leukocytes, centre(&debris.leukocytes.clusters) / area),
-            (P::Bacilli, centre(&debris.bacilli.clusters) / area),
-            (P::Speckles, centre(&debris.speckles.count) / area),
-            (P::Smudges, centre(&debris.smudges.count) / area),
-            (P::Dirt, centre(&debris.dirt.drifts) / area),
-            (P::Scatter, centre(&base.background.scatter)),
+            (P::Leukocytes, density(&debris.leukocytes.clusters, area)),
+            (P::Bacilli, density(&debris.bacilli.clusters, area)),
+            (P::Speckles, density(&debris.speckles.count, area)),
+            (P::Smudges, density(&debris.smudges.count, area)),
+            (P::Dirt, density(&debris.dirt.clusters, area)),
+            (P::Scatter, centre(&base.background.texture)),
         ] {
             values.set(parameter, value);
         }
@@ -148,24 +149,23 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
     let pixel_um = if on(P::Pixel) { get(P::Pixel) } else { setting.pixel_um };
     let mut r = setting.base.clone();
     let [width, height] = setting.size_px.map(|side| side as f64);
-    let area = width * height * pixel_um * pixel_um * 1e-6;
     r.field.width_px = width.into();
     r.field.height_px = height.into();
     r.field.pixel_um = number(pixel_um);
     r.field.magnification = 0.0.into();
     r.camera.bits = f64::from(setting.bits).into();
-    if setting.extended && r.focus.picture != Picture::Extended {
+    if setting.extended && r.focus.output != FocusOutput::Edf {
         r.focus = Preset::ExtendedFocus.recipe().focus;
     } else if !setting.extended {
-        r.focus.picture = Picture::Planes;
+        r.focus.output = FocusOutput::Planes;
         r.focus.planes = 1.0.into();
     }
     let either = |a: P, b: P| on(a) || on(b);
     let or_base = |parameter: P| if on(parameter) { get(parameter) } else { base.get(parameter) };
 
-    if either(P::Level, P::LevelSpread) {
+    if either(P::Level, P::LevelSd) {
         let level = or_base(P::Level) + TAKEN * or_base(P::Scatter);
-        r.background.level = cut(normal(level, or_base(P::LevelSpread)), 0.05, 1.1);
+        r.background.level = cut(normal(level, or_base(P::LevelSd)), 0.05, 1.1);
     }
     if either(P::BowlAcross, P::BowlDown) {
         let off_centre = match &r.background.illumination {
@@ -173,20 +173,20 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
             Illumination::Border(_) => 0.0.into(),
         };
         r.background.illumination = Illumination::Bowl(Bowl {
-            x2: cut(normal(or_base(P::BowlAcross), setting.spreads.across), 0.0, 0.45),
-            y2: cut(normal(or_base(P::BowlDown), setting.spreads.down), 0.0, 0.45),
+            x2: cut(normal(or_base(P::BowlAcross), setting.field_sd.across), 0.0, 0.45),
+            y2: cut(normal(or_base(P::BowlDown), setting.field_sd.down), 0.0, 0.45),
             off_centre,
         });
     }
     camera(&mut r, setting, &on, &or_base);
-    if either(P::Blur, P::BlurSpread) {
-        *blur(&mut r.optics) = cut(log_normal(or_base(P::Blur), or_base(P::BlurSpread)), 0.0, 10.0);
+    if either(P::Blur, P::BlurSd) {
+        *blur(&mut r.optics) = cut(log_normal(or_base(P::Blur), or_base(P::BlurSd)), 0.0, 10.0);
     }
     let stain = &mut r.stain;
     for (median, log_sd, of_field, of_slide) in [
-        (P::FieldCytoplasm, P::FieldCytoplasmSpread, &mut stain.field_cytoplasm, Some(&mut stain.slide_cytoplasm)),
-        (P::FieldNucleus, P::FieldNucleusSpread, &mut stain.field_nucleus, Some(&mut stain.slide_nucleus)),
-        (P::Texture, P::TextureSpread, &mut stain.field_texture, None),
+        (P::FieldCytoplasm, P::FieldCytoplasmSd, &mut stain.field_cytoplasm, Some(&mut stain.slide_cytoplasm)),
+        (P::FieldNucleus, P::FieldNucleusSd, &mut stain.field_nucleus, Some(&mut stain.slide_nucleus)),
+        (P::Texture, P::TextureSd, &mut stain.field_texture, None),
     ] {
         if either(median, log_sd) {
             *of_field = cut(log_normal(or_base(median), or_base(log_sd)), 0.0, 20.0);
@@ -206,13 +206,13 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
             *number = cut(times(number, factor), 0.0, most);
         }
     }
-    cells(&mut r, area, &on, &or_base);
+    cells(&mut r, &setting.base, &on, &or_base);
     // From the value and what the recipe to begin with has.
     type Spread = fn(f64, &Number) -> Number;
     let mut single: Vec<(P, &mut Number, Spread)> = vec![
-        (P::Scatter, &mut r.background.scatter, about),
-        (P::Across, &mut r.focus.fused_noise_across, |value, _| number(value)),
-        (P::Down, &mut r.focus.fused_noise_down, |value, _| number(value)),
+        (P::Scatter, &mut r.background.texture, about),
+        (P::Across, &mut r.focus.noise_correlation_x, |value, _| number(value)),
+        (P::Down, &mut r.focus.noise_correlation_y, |value, _| number(value)),
         (P::Depth, &mut r.slide.depth_um, |value, _| number(value)),
         (P::Dome, &mut r.nucleus.dome, |value, _| within(value, 0.2)),
         (P::Rim, &mut r.nucleus.rim, |value, _| Number::uniform(0.0, rounded(2.0 * value))),
@@ -230,14 +230,15 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
         (P::Bacilli, &mut debris.bacilli.clusters),
         (P::Speckles, &mut debris.speckles.count),
         (P::Smudges, &mut debris.smudges.count),
-        (P::Dirt, &mut debris.dirt.drifts),
+        (P::Dirt, &mut debris.dirt.clusters),
     ] {
+        let spread = spread(count.number());
         if !on(parameter) {
-            *count = counted(times(count, area / base_area(&setting.base)));
+            *count = per_mm2(count, base_area(&setting.base), 1.0);
         } else {
             // What a preset has none of has no spread to keep.
-            let log_sd = if spread(count) > 0.0 { spread(count).min(1.0) } else { 0.6 };
-            *count = counted(log_normal(get(parameter) * area, log_sd));
+            let log_sd = if spread > 0.0 { spread.min(1.0) } else { 0.6 };
+            *count = Abundance::per_mm2(log_normal(get(parameter), log_sd));
         }
     }
     r
@@ -248,7 +249,8 @@ const PAIR: [&str; 2] = ["superficial", "intermediate"];
 
 /// How many there are of them.
 fn of_pair(recipe: &Recipe) -> [f64; 2] {
-    PAIR.map(|class| recipe.cells.get(class).map_or(0.0, |mix| centre(&mix.count)))
+    let area = base_area(recipe);
+    PAIR.map(|class| recipe.cells.get(class).map_or(0.0, |mix| density(&mix.count, area)))
 }
 
 fn base_area(base: &Recipe) -> f64 {
@@ -268,7 +270,7 @@ fn camera(r: &mut Recipe, setting: &Setting, on: &impl Fn(P) -> bool, or_base: &
     }
     /// Neither part is less than this of what is left of the noise.
     const LEAST: f64 = 0.02;
-    let glare = centre(&r.camera.glare_removed);
+    let glare = centre(&r.camera.glare_subtracted);
     let signal = signal(or_base(P::Level), glare);
     let all = or_base(P::Noise) * or_base(P::Noise);
     let pattern = or_base(P::Pattern).clamp(0.0, P::Pattern.prior().high) * all;
@@ -279,7 +281,7 @@ fn camera(r: &mut Recipe, setting: &Setting, on: &impl Fn(P) -> bool, or_base: &
     let camera = &mut r.camera;
     camera.full_well_e = number(per_dn * LEVELS / (1.0 - glare));
     // A spread of all noise is laid on the reading alone.
-    let spread = (setting.spreads.noise / (1.0 - photons)).min(0.5);
+    let spread = (setting.field_sd.noise / (1.0 - photons)).min(0.5);
     camera.read_noise_e = if spread > 0.02 { log_normal(read, spread) } else { number(read) };
     camera.read_noise_rms_e = 0.0.into();
     camera.dsnu_e = 0.0.into();
@@ -287,22 +289,23 @@ fn camera(r: &mut Recipe, setting: &Setting, on: &impl Fn(P) -> bool, or_base: &
     camera.prnu = number(pattern.sqrt() / signal);
 }
 
-fn cells(r: &mut Recipe, area: f64, on: &impl Fn(P) -> bool, or_base: &impl Fn(P) -> f64) {
-    let found = on(P::Cells) || on(P::CellsSpread) || on(P::Superficial);
-    let (total, share) = (or_base(P::Cells) * area, or_base(P::Superficial));
-    let base_total: f64 = r.cells.values().map(|mix| centre(&mix.count)).sum();
+fn cells(r: &mut Recipe, base: &Recipe, on: &impl Fn(P) -> bool, or_base: &impl Fn(P) -> f64) {
+    let found = on(P::Cells) || on(P::CellsSd) || on(P::Superficial);
+    let (total, share) = (or_base(P::Cells), or_base(P::Superficial));
+    let area = base_area(base);
+    let base_total: f64 = r.cells.values().map(|mix| density(&mix.count, area)).sum();
     let scale = total / base_total.max(1e-9);
-    let pair = of_pair(r);
+    let pair = of_pair(base);
     for (class, mix) in &mut r.cells {
         if found {
             let own = match class.as_str() {
                 "superficial" if on(P::Superficial) => (pair[0] + pair[1]) * share,
                 "intermediate" if on(P::Superficial) => (pair[0] + pair[1]) * (1.0 - share),
-                _ => centre(&mix.count),
+                _ => density(&mix.count, area),
             };
-            mix.count = counted(log_normal((own * scale).max(0.01), or_base(P::CellsSpread)));
+            mix.count = Abundance::per_mm2(log_normal((own * scale).max(0.1), or_base(P::CellsSd)));
         } else {
-            mix.count = counted(times(&mix.count, scale));
+            mix.count = per_mm2(&mix.count, area, scale);
         }
         if on(P::Size) {
             mix.size = number(or_base(P::Size));
@@ -390,15 +393,14 @@ fn times(number: &Number, factor: f64) -> Number {
     }
 }
 
-/// What is written out of a count is whole.
-fn counted(number: Number) -> Number {
-    match number {
-        Number::Fixed(value) => Number::Fixed(libm::round(value)),
-        Number::Drawn { law: Law::Choice(values), min, max } => {
-            Number::Drawn { law: Law::Choice(values.into_iter().map(libm::round).collect()), min, max }
-        }
-        drawn => drawn,
-    }
+/// Returns the centre of a density per mm², or of a count divided by the area of a field.
+fn density(abundance: &Abundance, area: f64) -> f64 {
+    centre(abundance.number()) / if abundance.is_density() { 1.0 } else { area }
+}
+
+/// Returns a density per mm², multiplied by a factor; a count is divided by the area of a field.
+fn per_mm2(abundance: &Abundance, area: f64, factor: f64) -> Abundance {
+    Abundance::per_mm2(times(abundance.number(), factor / if abundance.is_density() { 1.0 } else { area }))
 }
 
 /// The middle of a distribution: the median of a log-normal, the mean of others.
@@ -445,7 +447,7 @@ mod tests {
             bits: 8,
             extended,
             seek_pixel: false,
-            spreads: Spreads::default(),
+            field_sd: FieldSd::default(),
         }
     }
 
@@ -472,7 +474,7 @@ mod tests {
         let values = Values::at(&std::array::from_fn(|i| 0.2 + 0.6 * (i as f64) / PARAMETERS.len() as f64));
         let made = recipe(&setting, &values, |_| true);
         let back = Setting { base: made, ..setting }.base_values();
-        for parameter in PARAMETERS.into_iter().filter(|p| !matches!(p, P::Pixel | P::Structure | P::CellsSpread)) {
+        for parameter in PARAMETERS.into_iter().filter(|p| !matches!(p, P::Pixel | P::Structure | P::CellsSd)) {
             let (a, b) = (values.get(parameter), back.get(parameter));
             assert!((a - b).abs() < 0.03 * a.abs() + 0.01, "{parameter:?}: {a} {b}");
         }

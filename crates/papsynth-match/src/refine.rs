@@ -3,10 +3,12 @@
 use argmin::core::{CostFunction, Executor, Gradient, State};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
+use papsynth_judge::Control;
 use rayon::prelude::*;
 
+use crate::error::Error;
 use crate::regression::{Estimate, Features, Scaler};
-use crate::table::Table;
+use crate::table::SimulationTable;
 
 /// Statistics further apart than so many standard errors count in proportion: what a recipe cannot show must not bend the rest.
 const FAR: f64 = 3.0;
@@ -31,19 +33,22 @@ pub(crate) struct Forward {
 const LEAST_ERROR: f64 = 0.05;
 
 impl Forward {
-    pub(crate) fn new(table: &Table) -> Self {
+    pub(crate) fn new(table: &SimulationTable, control: &Control) -> Result<Self, Error> {
         let scaler = Scaler::new(&table.statistics.iter().map(Vec::as_slice).collect::<Vec<_>>());
         let statistics: Vec<Vec<f64>> = table.statistics.iter().map(|r| scaler.scaled(r)).collect();
         let rows: Vec<Vec<f64>> = table.places.iter().map(|p| features(p)).collect();
         let features = Features::new(&rows);
         let fit = |c: usize| {
             let y: Vec<f64> = statistics.iter().map(|s| s[c]).collect();
+            control.check()?;
             let ridge = features.best(&y);
             let factors: Vec<f64> = std::iter::once(ridge.mean).chain(ridge.factors).collect();
-            (factors, ridge.error.sqrt().max(LEAST_ERROR))
+            Ok((factors, ridge.error.sqrt().max(LEAST_ERROR)))
         };
-        let (factors, errors) = (0..table.names.len()).into_par_iter().map(fit).unzip();
-        Self { scaler, factors, errors }
+        let fits: Vec<(Vec<f64>, f64)> =
+            (0..table.names.len()).into_par_iter().map(fit).collect::<Result<_, Error>>()?;
+        let (factors, errors) = fits.into_iter().unzip();
+        Ok(Self { scaler, factors, errors })
     }
 
     fn at(&self, statistic: usize, features: &[f64]) -> f64 {
@@ -83,7 +88,7 @@ fn features(places: &[f64]) -> Vec<f64> {
 
 /// What is minimised: the distance that the parabolas tell, with what they were wrong by at the last simulation taken off.
 #[derive(Clone)]
-struct Told<'a> {
+struct Objective<'a> {
     forward: &'a Forward,
     /// Statistics that count, and where they should be by the parabolas.
     aims: Vec<(usize, f64)>,
@@ -93,7 +98,7 @@ struct Told<'a> {
     moving: Vec<(usize, Estimate)>,
 }
 
-impl Told<'_> {
+impl Objective<'_> {
     /// Places within the intervals, from numbers without bounds; with the slopes.
     fn inside(&self, free: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let mut places = self.places.clone();
@@ -121,7 +126,7 @@ impl Told<'_> {
     }
 }
 
-impl CostFunction for Told<'_> {
+impl CostFunction for Objective<'_> {
     type Param = Vec<f64>;
     type Output = f64;
 
@@ -134,7 +139,7 @@ impl CostFunction for Told<'_> {
     }
 }
 
-impl Gradient for Told<'_> {
+impl Gradient for Objective<'_> {
     type Param = Vec<f64>;
     type Gradient = Vec<f64>;
 
@@ -164,7 +169,7 @@ pub(crate) fn propose(forward: &Forward, seen: [&[f64]; 2], places: &[f64], movi
     let here = features(places);
     let known = |s: &usize| seen.iter().all(|values| values[*s].is_finite());
     let aims = (0..wanted.len()).filter(known).map(|s| (s, wanted[s] - found[s] + forward.at(s, &here))).collect();
-    let told = Told { forward, aims, places: places.to_vec(), moving: moving.to_vec() };
+    let told = Objective { forward, aims, places: places.to_vec(), moving: moving.to_vec() };
     let start = told.outside(places);
     if start.is_empty() {
         return places.to_vec();

@@ -7,10 +7,13 @@
 //! them: scales, both regressions and the choice of their penalties.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use papsynth_judge::{Control, Phase};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use portable_numerics::statistics::{deviation, mean};
+
+use crate::error::Error;
 
 /// A value with its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -46,7 +49,7 @@ impl Scaler {
         let column = |c: usize| {
             let known: Vec<f64> = rows.iter().map(|r| r[c]).filter(|v| v.is_finite()).collect();
             let [mean, sd] = [mean(&known), deviation(&known)].map(|v| if v.is_finite() { v } else { 0.0 });
-            let [low, high] = reach(&known);
+            let [low, high] = min_max(&known);
             [mean, sd, low, high]
         };
         Self((0..rows.first().map_or(0, |r| r.len())).map(column).collect())
@@ -67,8 +70,8 @@ impl Scaler {
 /// Learns parameters, as places in their ranges, from statistics.
 #[derive(Debug, Clone)]
 pub struct Regression {
-    told: Told,
-    reach: Vec<Reach>,
+    predictor: Predictor,
+    intervals: Vec<IntervalModel>,
     explained: Vec<f64>,
 }
 
@@ -76,32 +79,48 @@ impl Regression {
     /// Learns from rows of statistics and rows of places.
     #[must_use]
     pub fn new(statistics: &[Vec<f64>], places: &[Vec<f64>]) -> Self {
+        // Without a stop flag there is no error.
+        Self::new_with(statistics, places, &Control::NONE).unwrap_or_else(|_| unreachable!())
+    }
+
+    /// As [`new`](Self::new), with progress reports and a stop flag. The phase is "fitting regressions".
+    ///
+    /// # Errors
+    /// [`Error::Stopped`] if the stop flag is set.
+    pub fn new_with(statistics: &[Vec<f64>], places: &[Vec<f64>], control: &Control) -> Result<Self, Error> {
         let (n, columns) = (statistics.len(), places.first().map_or(0, Vec::len));
+        let phase = control.phase("fitting regressions", (2 * (FOLDS + 1) + 1) * columns);
         // Fit number FOLDS leaves no row out.
-        let without =
-            |fold: usize| Told::new(statistics, places, &(0..n).filter(|i| i % FOLDS != fold).collect::<Vec<_>>());
-        let mut fits: Vec<Told> = (0..=FOLDS).into_par_iter().map(without).collect();
+        let without = |fold: usize| {
+            Predictor::new(statistics, places, &(0..n).filter(|i| i % FOLDS != fold).collect::<Vec<_>>(), &phase)
+        };
+        let mut fits: Vec<Predictor> = (0..=FOLDS).into_par_iter().map(without).collect::<Result<_, Error>>()?;
         // Out of fold: each row is predicted by the fit that left it out.
         let summaries: Vec<Vec<f64>> = (0..n).map(|row| fits[row % FOLDS].summary(&statistics[row])).collect();
         let values: Vec<Vec<f64>> = (0..n).map(|row| fits[row % FOLDS].values(&summaries[row])).collect();
-        let told = fits.swap_remove(FOLDS);
+        let predictor = fits.swap_remove(FOLDS);
         let missed = |c: usize| -> Vec<f64> { values.iter().zip(places).map(|(v, p)| (v[c] - p[c]).abs()).collect() };
         // Places are spread evenly over 0 to 1.
         let explained = |c| 1.0 - 12.0 * missed(c).iter().map(|m| m * m).sum::<f64>() / n.max(1) as f64;
         let column = |c: usize| values.iter().map(|v| v[c]).collect::<Vec<_>>();
-        let reach = |c| Reach::new(&summaries, c, &column(c), &missed(c));
-        let (explained, reach) =
-            ((0..columns).map(explained).collect(), (0..columns).into_par_iter().map(reach).collect());
-        Self { told, reach, explained }
+        let interval = |c| -> Result<IntervalModel, Error> {
+            let model = IntervalModel::new(&summaries, c, &column(c), &missed(c));
+            phase.step()?;
+            Ok(model)
+        };
+        let intervals = (0..columns).into_par_iter().map(interval).collect::<Result<_, Error>>()?;
+        Ok(Self { predictor, intervals, explained: (0..columns).map(explained).collect() })
     }
 
     /// The places of statistics, with their intervals, within 0 to 1.
     #[must_use]
     pub fn estimate(&self, statistics: &[f64]) -> Vec<Estimate> {
-        let summary = self.told.summary(statistics);
-        let values = self.told.values(&summary);
-        let with = |(c, (value, reach)): (usize, (f64, &Reach))| reach.about(value, reach.usual(&bent(&summary, c)));
-        values.into_iter().zip(&self.reach).enumerate().map(with).collect()
+        let summary = self.predictor.summary(statistics);
+        let values = self.predictor.values(&summary);
+        let with = |(c, (value, model)): (usize, (f64, &IntervalModel))| {
+            model.interval(value, model.usual(&bent(&summary, c)))
+        };
+        values.into_iter().zip(&self.intervals).enumerate().map(with).collect()
     }
 
     /// Part of each parameter's variance over the table that unseen rows were told.
@@ -113,28 +132,33 @@ impl Regression {
 
 /// What rows of statistics tell: values without intervals.
 #[derive(Debug, Clone)]
-struct Told {
+struct Predictor {
     scaler: Scaler,
     first: Vec<Ridge>,
     second: Vec<Ridge>,
 }
 
-impl Told {
-    fn new(statistics: &[Vec<f64>], places: &[Vec<f64>], kept: &[usize]) -> Self {
+impl Predictor {
+    fn new(statistics: &[Vec<f64>], places: &[Vec<f64>], kept: &[usize], phase: &Phase) -> Result<Self, Error> {
         let of_kept: Vec<&[f64]> = kept.iter().map(|i| statistics[*i].as_slice()).collect();
         let scaler = Scaler::new(&of_kept);
         let columns = places.first().map_or(0, Vec::len);
         let column = |c: usize| -> Vec<f64> { kept.iter().map(|i| places[*i][c]).collect() };
         let rows: Vec<Vec<f64>> = of_kept.iter().map(|r| scaler.scaled(r)).collect();
-        let first: Vec<Ridge> = (0..columns).map(|c| weighed(&rows, &column(c))).collect();
+        let first = |c: usize| -> Result<Ridge, Error> {
+            phase.step()?;
+            Ok(weighted(&rows, &column(c)))
+        };
+        let first: Vec<Ridge> = (0..columns).map(first).collect::<Result<_, Error>>()?;
         let summaries: Vec<Vec<f64>> =
             (0..kept.len()).map(|i| first.iter().map(|r| of_one_scale(r.unseen[i])).collect()).collect();
         let second = |c: usize| {
+            phase.step()?;
             let rows: Vec<Vec<f64>> = summaries.iter().map(|s| bent(s, c)).collect();
-            Features::new(&rows).best(&column(c))
+            Ok(Features::new(&rows).best(&column(c)))
         };
-        let second = (0..columns).map(second).collect();
-        Self { scaler, first, second }
+        let second = (0..columns).map(second).collect::<Result<_, Error>>()?;
+        Ok(Self { scaler, first, second })
     }
 
     fn summary(&self, statistics: &[f64]) -> Vec<f64> {
@@ -153,7 +177,7 @@ fn of_one_scale(place: f64) -> f64 {
 }
 
 /// The ridge in which each statistic counts as much as it goes with the parameter by itself: of two hundred, most have no say in it.
-fn weighed(rows: &[Vec<f64>], y: &[f64]) -> Ridge {
+fn weighted(rows: &[Vec<f64>], y: &[f64]) -> Ridge {
     let middle = mean(y);
     let weight = |s: usize| {
         let [mut with, mut own, mut all] = [0.0; 3];
@@ -183,14 +207,14 @@ fn bent(summary: &[f64], own: usize) -> Vec<f64> {
 
 /// How far intervals reach.
 #[derive(Debug, Clone)]
-struct Reach {
+struct IntervalModel {
     /// Logarithm of the usual miss.
     misses: Ridge,
     /// Intervals reach so many times the usual miss.
     times: f64,
 }
 
-impl Reach {
+impl IntervalModel {
     /// From the summaries, values and misses of unseen rows.
     fn new(summaries: &[Vec<f64>], own: usize, values: &[f64], missed: &[f64]) -> Self {
         let rows: Vec<Vec<f64>> = summaries.iter().map(|s| bent(s, own)).collect();
@@ -205,18 +229,18 @@ impl Reach {
             let rank = papsynth_judge::number::whole(libm::ceil(CONFIDENCE * (times.len() as f64 + 1.0))).max(1);
             times.get(rank - 1).copied().unwrap_or(f64::INFINITY)
         };
-        let mut reach = Self { misses, times: asked(&|_| true) };
+        let mut model = Self { misses, times: asked(&|_| true) };
         // What counts is how often those intervals hold that are narrow enough to be told: of too few of them nothing is known.
         loop {
             let narrow = |i: usize| {
-                let e = reach.about(values[i], usual[i]);
+                let e = model.interval(values[i], usual[i]);
                 e.high - e.low <= WIDEST
             };
             let times = asked(&narrow);
-            if times <= reach.times || !(0..values.len()).any(narrow) {
-                return reach;
+            if times <= model.times || !(0..values.len()).any(narrow) {
+                return model;
             }
-            reach.times = times;
+            model.times = times;
         }
     }
 
@@ -224,7 +248,7 @@ impl Reach {
         libm::exp(self.misses.predict(row))
     }
 
-    fn about(&self, value: f64, usual: f64) -> Estimate {
+    fn interval(&self, value: f64, usual: f64) -> Estimate {
         let half = self.times * usual;
         Estimate { value, low: (value - half).max(0.0), high: (value + half).min(1.0) }
     }
@@ -334,7 +358,7 @@ impl Ridge {
 }
 
 /// The least and the largest value.
-pub(crate) fn reach(values: &[f64]) -> [f64; 2] {
+pub(crate) fn min_max(values: &[f64]) -> [f64; 2] {
     values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(*v), high.max(*v)])
 }
 

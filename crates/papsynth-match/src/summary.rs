@@ -1,23 +1,23 @@
 //! What windows are like, in numbers that regressions learn from.
 
 use papsynth_judge::number::{single, whole};
-use papsynth_judge::{Field, Picture, Statistics, Table};
+use papsynth_judge::{Control, FeatureTable, Field, FieldImage, Statistics};
 use rayon::prelude::*;
 
 use crate::error::Error;
 use crate::noise;
-use crate::view::View;
+use crate::view::WindowSampler;
 use portable_numerics::statistics::{deviation, mean, quantile};
 
 /// How a number enters.
 #[derive(Clone, Copy)]
-enum As {
+enum Transform {
     Itself,
     /// The logarithm of it and so much.
     Log(f64),
 }
 
-impl As {
+impl Transform {
     fn of(self, value: f64) -> f64 {
         match self {
             Self::Itself => value,
@@ -28,67 +28,68 @@ impl As {
 }
 
 /// A feature of a table and how it enters.
-type Feature = (&'static str, As);
+type Feature = (&'static str, Transform);
 
 /// Features of nuclei that are looked at.
 const NUCLEI: [Feature; 25] = [
-    ("nucleus area, um2", As::Log(0.0)),
-    ("core absorbance", As::Itself),
-    ("core above surroundings", As::Itself),
-    ("absorbance beside", As::Itself),
-    ("spread beside", As::Log(0.005)),
-    ("core sd", As::Log(0.002)),
-    ("core sd without trend", As::Log(0.002)),
-    ("core sd over contrast", As::Log(0.01)),
-    ("core slope", As::Log(0.002)),
-    ("core slope over sd", As::Itself),
-    ("rim to centre, bin 1 of 5", As::Itself),
-    ("rim to centre, bin 2 of 5", As::Itself),
-    ("rim to centre, bin 3 of 5", As::Itself),
-    ("rim to centre, bin 5 of 5", As::Itself),
-    ("rim sigma, px", As::Log(0.0)),
-    ("darkest depth over core", As::Itself),
-    ("rim slope over contrast", As::Itself),
-    ("core correlation at 1 px", As::Itself),
-    ("core correlation at 2 px", As::Itself),
-    ("core correlation at 4 px", As::Itself),
-    ("core power at 1 px", As::Log(0.001)),
-    ("core power at 4 px", As::Log(0.001)),
-    ("log moment 2", As::Itself),
-    ("core skewness", As::Itself),
-    ("nucleus eccentricity", As::Itself),
+    ("nucleus area, um2", Transform::Log(0.0)),
+    ("core absorbance", Transform::Itself),
+    ("core above surroundings", Transform::Itself),
+    ("absorbance beside", Transform::Itself),
+    ("spread beside", Transform::Log(0.005)),
+    ("core sd", Transform::Log(0.002)),
+    ("core sd without trend", Transform::Log(0.002)),
+    ("core sd over contrast", Transform::Log(0.01)),
+    ("core slope", Transform::Log(0.002)),
+    ("core slope over sd", Transform::Itself),
+    ("rim to centre, bin 1 of 5", Transform::Itself),
+    ("rim to centre, bin 2 of 5", Transform::Itself),
+    ("rim to centre, bin 3 of 5", Transform::Itself),
+    ("rim to centre, bin 5 of 5", Transform::Itself),
+    ("rim sigma, px", Transform::Log(0.0)),
+    ("darkest depth over core", Transform::Itself),
+    ("rim slope over contrast", Transform::Itself),
+    ("core correlation at 1 px", Transform::Itself),
+    ("core correlation at 2 px", Transform::Itself),
+    ("core correlation at 4 px", Transform::Itself),
+    ("core power at 1 px", Transform::Log(0.001)),
+    ("core power at 4 px", Transform::Log(0.001)),
+    ("log moment 2", Transform::Itself),
+    ("core skewness", Transform::Itself),
+    ("nucleus eccentricity", Transform::Itself),
 ];
 
 /// Features whose spread within windows and between them are told apart: where the field differs, all its nuclei do.
 const NUCLEI_APART: [Feature; 5] = [
-    ("core above surroundings", As::Log(0.02)),
-    ("core sd over contrast", As::Log(0.01)),
-    ("core sd without trend", As::Log(0.002)),
-    ("rim sigma, px", As::Log(0.0)),
-    ("absorbance beside", As::Log(0.01)),
+    ("core above surroundings", Transform::Log(0.02)),
+    ("core sd over contrast", Transform::Log(0.01)),
+    ("core sd without trend", Transform::Log(0.002)),
+    ("rim sigma, px", Transform::Log(0.0)),
+    ("absorbance beside", Transform::Log(0.01)),
 ];
 
 /// The same of free cells.
-const CELLS_APART: [Feature; 2] = [("cytoplasm absorbance", As::Log(0.005)), ("cell area, um2", As::Log(0.0))];
+const CELLS_APART: [Feature; 2] =
+    [("cytoplasm absorbance", Transform::Log(0.005)), ("cell area, um2", Transform::Log(0.0))];
 
 /// Distances within which pairs of nuclei are counted over all windows, µm.
 const PAIRS_UM: [f64; 5] = [8.0, 16.0, 33.0, 66.0, 130.0];
 
 /// Features of free cells.
 const CELLS: [Feature; 13] = [
-    ("cell area, um2", As::Log(0.0)),
-    ("cytoplasm absorbance", As::Log(0.005)),
-    ("cytoplasm sd over median", As::Log(0.02)),
-    ("cytoplasm quantile 0.9 over median", As::Itself),
-    ("cytoplasm power at 1 px over median", As::Log(0.002)),
-    ("cytoplasm power at 2 px over median", As::Log(0.002)),
-    ("cytoplasm power at 4 px over median", As::Log(0.002)),
-    ("cytoplasm power at 8 px over median", As::Log(0.002)),
-    ("cytoplasm slope over median", As::Log(0.002)),
-    ("dark spots in cytoplasm, um-2", As::Itself),
-    ("sigma of the cell's rim, px, quantile 0.25", As::Log(0.2)),
-    ("nucleus over cell area", As::Log(0.001)),
-    ("cell circularity", As::Itself),
+    ("cell area, um2", Transform::Log(0.0)),
+    ("cytoplasm absorbance", Transform::Log(0.005)),
+    ("cytoplasm sd over median", Transform::Log(0.02)),
+    ("cytoplasm quantile 0.9 over median", Transform::Itself),
+    ("cytoplasm power at 1 px over median", Transform::Log(0.002)),
+    ("cytoplasm power at 2 px over median", Transform::Log(0.002)),
+    ("cytoplasm power at 4 px over median", Transform::Log(0.002)),
+    ("cytoplasm power at 8 px over median", Transform::Log(0.002)),
+    ("cytoplasm slope over median", Transform::Log(0.002)),
+    ("dark spots in cytoplasm, um-2", Transform::Itself),
+    ("sigma of the cell's rim, px, quantile 0.25", Transform::Log(0.2)),
+    ("nucleus over cell area", Transform::Log(0.001)),
+    ("cell circularity", Transform::Itself),
 ];
 
 /// Parts of a window darker than these.
@@ -102,28 +103,28 @@ const LEAST: usize = 4;
 pub(crate) struct Window {
     /// Numbers of the window as a whole.
     whole: Vec<(String, f64)>,
-    nuclei: Table,
-    cells: Table,
+    nuclei: FeatureTable,
+    cells: FeatureTable,
     /// Pairs of nuclei within each of [`PAIRS_UM`], and how many as many nuclei thrown at random would make.
     pairs: [[f64; 2]; PAIRS_UM.len()],
 }
 
 /// Numbers of the statistics of a window.
 fn scalars(s: &Statistics) -> Vec<(&'static str, f64)> {
-    let ripley = s.ripley.map(|k| As::Log(0.1).of(k));
+    let ripley = s.ripley.map(|k| Transform::Log(0.1).of(k));
     vec![
-        ("log noise", As::Log(0.0).of(s.noise_dn)),
+        ("log noise", Transform::Log(0.0).of(s.noise_dn)),
         ("noise correlation across", s.noise_across),
         ("noise correlation down", s.noise_down),
         ("noise correlation diagonally", s.noise_diagonal),
-        ("log coverage", As::Log(0.01).of(s.coverage)),
-        ("log absorbance of what is covered", As::Log(0.005).of(s.covered_a)),
-        ("log range of it", As::Log(0.0).of(s.covered_range)),
-        ("log part of it in layers", As::Log(0.02).of(s.layered)),
+        ("log coverage", Transform::Log(0.01).of(s.coverage)),
+        ("log absorbance of what is covered", Transform::Log(0.005).of(s.covered_a)),
+        ("log range of it", Transform::Log(0.0).of(s.covered_range)),
+        ("log part of it in layers", Transform::Log(0.02).of(s.layered)),
         ("slope of the spectrum", s.spectrum_slope),
-        ("log edge sigma p10", As::Log(0.1).of(s.edge_sigma_p10)),
-        ("log edge sigma p50", As::Log(0.1).of(s.edge_sigma_p50)),
-        ("log nuclei", As::Log(20.0).of(s.nuclei_mm2)),
+        ("log edge sigma p10", Transform::Log(0.1).of(s.edge_sigma_p10)),
+        ("log edge sigma p50", Transform::Log(0.1).of(s.edge_sigma_p50)),
+        ("log nuclei", Transform::Log(20.0).of(s.nuclei_mm2)),
         ("Clark-Evans", s.clark_evans),
         ("log K at 16.5 um", ripley[0]),
         ("log K at 33 um", ripley[1]),
@@ -153,27 +154,35 @@ const SPREAD: [&str; 13] = [
 ];
 
 impl Window {
-    pub(crate) fn new(picture: &Picture, view: &View) -> Result<Self, Error> {
-        let Field { statistics: s, nuclei, cells, .. } = view.gauge.measure(picture)?;
+    pub(crate) fn new(picture: &FieldImage, view: &WindowSampler, control: &Control) -> Result<Self, Error> {
+        let Field { statistics: s, nuclei, cells, .. } = view.measurer.measure_with(picture, control)?;
+        control.check()?;
         let (grey, width) = (&picture.grey, picture.width);
         let empty = s.background_dn * f64::from(picture.full_scale) / crate::recipe::LEVELS;
         let [fine, coarse] = noise::unevenness(grey, width, empty);
         let named = |(name, value): (&str, f64)| (name.to_owned(), value);
         let mut whole: Vec<(String, f64)> = scalars(&s).into_iter().map(named).collect();
         whole.extend(s.spectrum.iter().enumerate().map(|(i, power)| (format!("log power, ring {i}"), *power)));
-        whole.extend(TAILS.map(|a| (format!("part above {a}"), As::Log(0.002).of(tail(&s.histogram, a)))));
+        whole.extend(TAILS.map(|a| (format!("part above {a}"), Transform::Log(0.002).of(tail(&s.histogram, a)))));
         let law = (1..).zip(noise::law(grey, width, empty));
         whole.extend(law.map(|(i, noise)| (format!("noise in the dark, bin {i}"), noise)));
         whole.push(("unevenness of the light, finely".to_owned(), fine));
         whole.push(("unevenness of the light, coarsely".to_owned(), coarse));
+        control.check()?;
         whole.extend(noise::counts(grey, width, single(empty)));
         let pairs = PAIRS_UM.map(|um| pairs(&nuclei.places, picture, um / view.pixel_um));
         Ok(Self { whole, nuclei, cells, pairs })
     }
 
-    /// Of several pictures, side by side.
-    pub(crate) fn all(pictures: &[Picture], view: &View) -> Result<Vec<Self>, Error> {
-        pictures.par_iter().map(|p| Self::new(p, view)).collect::<Vec<_>>().into_iter().collect()
+    /// Measures several images in parallel.
+    pub(crate) fn all(images: &[FieldImage], view: &WindowSampler, control: &Control) -> Result<Vec<Self>, Error> {
+        let phase = control.phase("measuring windows", images.len());
+        let one = |image: &FieldImage| -> Result<Self, Error> {
+            let window = Self::new(image, view, control)?;
+            phase.step()?;
+            Ok(window)
+        };
+        images.par_iter().map(one).collect::<Vec<_>>().into_iter().collect()
     }
 
     pub(crate) fn nuclei(&self) -> usize {
@@ -182,7 +191,7 @@ impl Window {
 }
 
 /// How many pairs of places are within a distance, and how many are to be expected.
-fn pairs(places: &[[f64; 2]], picture: &Picture, within_px: f64) -> [f64; 2] {
+fn pairs(places: &[[f64; 2]], picture: &FieldImage, within_px: f64) -> [f64; 2] {
     let near = |a: &[f64; 2], b: &[f64; 2]| {
         let [x, y] = [a[0] - b[0], a[1] - b[1]];
         x * x + y * y <= within_px * within_px
@@ -214,8 +223,8 @@ impl Summary {
     ///
     /// # Errors
     /// If a picture is none.
-    pub fn of(pictures: &[Picture], view: &View) -> Result<Self, Error> {
-        Ok(Self::new(&Window::all(pictures, view)?))
+    pub fn of(images: &[FieldImage], view: &WindowSampler) -> Result<Self, Error> {
+        Ok(Self::new(&Window::all(images, view, &Control::NONE)?))
     }
 
     pub(crate) fn new(windows: &[Window]) -> Self {
@@ -224,16 +233,16 @@ impl Summary {
             let known: Vec<f64> = windows.iter().map(|w| w.whole[i].1).filter(|v| v.is_finite()).collect();
             all.put(name.clone(), mean(&known));
             if SPREAD.contains(&name.as_str()) {
-                all.put(format!("{name}, sd"), As::Log(0.01).of(deviation(&known)));
+                all.put(format!("{name}, sd"), Transform::Log(0.01).of(deviation(&known)));
             }
         }
-        let nuclei: Vec<&Table> = windows.iter().map(|w| &w.nuclei).collect();
+        let nuclei: Vec<&FeatureTable> = windows.iter().map(|w| &w.nuclei).collect();
         all.put_things("nuclei", &nuclei, &NUCLEI, &NUCLEI_APART);
         for (i, um) in PAIRS_UM.iter().enumerate() {
             let [found, expected] = [0, 1].map(|k| windows.iter().map(|w| w.pairs[i][k]).sum::<f64>());
             all.put(format!("pairs of nuclei within {um} um"), libm::log((found + 1.0) / (expected + 1.0)));
         }
-        let cells: Vec<&Table> = windows.iter().map(|w| &w.cells).collect();
+        let cells: Vec<&FeatureTable> = windows.iter().map(|w| &w.cells).collect();
         all.put_things("cells", &cells, &CELLS, &CELLS_APART);
         all
     }
@@ -244,22 +253,22 @@ impl Summary {
     }
 
     /// Features of things of one kind: over all windows, and within windows and between them.
-    fn put_things(&mut self, kind: &str, tables: &[&Table], features: &[Feature], told_apart: &[Feature]) {
+    fn put_things(&mut self, kind: &str, tables: &[&FeatureTable], features: &[Feature], told_apart: &[Feature]) {
         for (name, scale) in features {
             let [middle, spread] = pooled(tables, name, *scale);
             self.put(format!("{kind}: {name}"), middle);
-            self.put(format!("{kind}: {name}, spread"), As::Log(0.003).of(spread));
+            self.put(format!("{kind}: {name}, spread"), Transform::Log(0.003).of(spread));
         }
         for (name, scale) in told_apart {
             let [within, between] = apart(tables, name, *scale);
-            self.put(format!("{kind}: {name}, within windows"), As::Log(0.01).of(within));
-            self.put(format!("{kind}: {name}, between windows"), As::Log(0.02).of(between));
+            self.put(format!("{kind}: {name}, within windows"), Transform::Log(0.01).of(within));
+            self.put(format!("{kind}: {name}, between windows"), Transform::Log(0.02).of(between));
         }
     }
 }
 
 /// Middle and spread (three quarters of the distance between quartiles) of a feature over all tables.
-fn pooled(tables: &[&Table], name: &str, scale: As) -> [f64; 2] {
+fn pooled(tables: &[&FeatureTable], name: &str, scale: Transform) -> [f64; 2] {
     let mut values: Vec<f64> = tables.iter().flat_map(|t| t.column(name)).map(|v| scale.of(v)).collect();
     if values.len() < LEAST {
         return [f64::NAN; 2];
@@ -269,7 +278,7 @@ fn pooled(tables: &[&Table], name: &str, scale: As) -> [f64; 2] {
 }
 
 /// Standard deviation within tables, and that of their means without what the former makes of it.
-fn apart(tables: &[&Table], name: &str, scale: As) -> [f64; 2] {
+fn apart(tables: &[&FeatureTable], name: &str, scale: Transform) -> [f64; 2] {
     let known = tables.iter().map(|t| t.column(name).map(|v| scale.of(v)).collect::<Vec<f64>>());
     let groups: Vec<Vec<f64>> = known.filter(|v| v.len() >= 2).collect();
     if groups.is_empty() {

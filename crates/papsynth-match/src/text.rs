@@ -3,7 +3,7 @@
 use papsynth::recipe::{CellMix, RECIPE_VERSION, Recipe, is_toml_table, toml_value};
 use serde_json::Value;
 
-use crate::fit::{Answer, Fit, Origin};
+use crate::fit::{Fit, Origin, ParameterFit};
 use crate::recipe::rounded_to;
 
 /// Digits that values are told with.
@@ -34,7 +34,7 @@ impl Fit {
             );
         }
         let lost: Vec<&str> =
-            self.answers.iter().filter(|a| a.origin == Origin::NotIdentified).map(|a| a.path).collect();
+            self.parameters.iter().filter(|a| a.origin == Origin::NotIdentified).map(|a| a.path).collect();
         if !lost.is_empty() {
             out.push_str("# The fields do not tell these, which are as in the recipe to begin with:\n");
             lost.iter().for_each(|path| out.push_str(&format!("#   {path}\n")));
@@ -79,12 +79,12 @@ impl Fit {
     /// What is known of the parameters behind a field, as comments.
     fn notes(&self, path: &str) -> String {
         let told =
-            self.answers.iter().filter(|a| a.origin != Origin::NotIdentified && a.fields().any(|f| is_at(&f, path)));
+            self.parameters.iter().filter(|a| a.origin != Origin::NotIdentified && a.fields().any(|f| is_at(&f, path)));
         told.map(|a| format!("# {}\n", a.note())).collect()
     }
 }
 
-impl Answer {
+impl ParameterFit {
     /// The fields of a recipe that it stands in, classes of cells as `*`.
     fn fields(&self) -> impl Iterator<Item = String> + '_ {
         let (fields, _) = self.path.split_once(':').unwrap_or((self.path, ""));
@@ -124,7 +124,7 @@ mod tests {
     use super::*;
     use crate::fit::Distance;
     use crate::parameter::{PARAMETERS, Values};
-    use crate::recipe::{Setting, Spreads, recipe};
+    use crate::recipe::{FieldSd, Setting, recipe};
     use papsynth::recipe::Preset;
 
     #[test]
@@ -137,18 +137,19 @@ mod tests {
                 bits: 8,
                 extended: true,
                 seek_pixel: false,
-                spreads: Spreads::default(),
+                field_sd: FieldSd::default(),
             };
             let values = Values::at(&[0.4; PARAMETERS.len()]);
-            let answers = PARAMETERS.into_iter().filter(|p| setting.seeks(*p)).map(|parameter| {
+            let parameters = PARAMETERS.into_iter().filter(|p| setting.seeks(*p)).map(|parameter| {
                 let origin = if parameter.index() % 3 == 0 { Origin::NotIdentified } else { Origin::Simulated };
-                Answer::new(parameter, origin, values.get(parameter))
+                ParameterFit::new(parameter, origin, values.get(parameter))
             });
-            let answers: Vec<Answer> = answers.collect();
-            let fitted = |p| answers.iter().any(|a: &Answer| a.parameter == p && a.origin == Origin::Simulated);
+            let parameters: Vec<ParameterFit> = parameters.collect();
+            let fitted =
+                |p| parameters.iter().any(|a: &ParameterFit| a.parameter == p && a.origin == Origin::Simulated);
             let fit = Fit {
                 recipe: recipe(&setting, &values, fitted),
-                answers: answers.clone(),
+                parameters: parameters.clone(),
                 distance: Distance { before: 3.0, estimated: 2.0, after: 1.5 },
                 statistics: Vec::new(),
                 fields: 8,
@@ -160,7 +161,7 @@ mod tests {
             let text = fit.to_toml();
             let read: Recipe = toml::from_str(&text).unwrap_or_else(|e| panic!("{preset:?}: {e}\n{text}"));
             assert_eq!(read, fit.recipe, "{preset:?}\n{text}");
-            for answer in fit.answers.iter().filter(|a| a.origin == Origin::Simulated) {
+            for answer in fit.parameters.iter().filter(|a| a.origin == Origin::Simulated) {
                 assert!(text.contains(&answer.note()), "{preset:?}: {}\n{text}", answer.note());
             }
         }

@@ -1,59 +1,59 @@
-//! Windows on slides: cut out of real fields, or simulated.
+//! Windows: cut from real fields, or simulated.
 
 use papsynth::key::Key;
 use papsynth::recipe::Recipe;
 use papsynth::truth::Group;
 use papsynth::{Engine, Finished, Threads};
-use papsynth_judge::{Gauge, GaugeParams, Known, NucleiFrom, Picture};
+use papsynth_judge::{Control, FieldImage, Measurer, MeasurerParams, NucleiAnnotation, NucleiFrom};
 
 use crate::error::Error;
 use papsynth_judge::number::{single, whole};
 
-/// Makes the engine of a recipe: with the caller's model and inputs.
+/// Returns the engine of a recipe, with the model and the inputs of the caller.
 pub type MakeEngine<'a> = dyn Fn(&Recipe) -> Result<Engine, papsynth::Error> + Sync + 'a;
 
-/// Largest window, pixels: what is larger is cut into several.
+/// Largest window, pixels. Larger fields are cut into several windows.
 const WINDOW_PX: [usize; 2] = [640, 480];
 
-/// Width of the slide around a window that is simulated with it, µm: cells there reach into the window, as in real fields.
+/// Margin of the simulated field around a window, µm: cells in the margin extend into the window, as in real fields.
 const MARGIN_UM: f64 = 20.0;
 
-/// How pictures are looked at: real ones and simulated ones the same.
+/// Cuts, simulates and measures windows: the same for real and simulated fields.
 #[derive(Debug, Clone)]
-pub struct View {
-    /// Columns and rows of a window.
+pub struct WindowSampler {
+    /// Width and height of a window.
     pub window_px: [usize; 2],
     pub(crate) pixel_um: f64,
     margin_px: usize,
     from: NucleiFrom,
-    pub(crate) gauge: Gauge,
+    pub(crate) measurer: Measurer,
 }
 
-impl View {
-    /// Of fields of a size.
+impl WindowSampler {
+    /// Returns the sampler for fields of a size.
     ///
     /// # Errors
-    /// If the size of a pixel is out of range.
+    /// If the pixel size is out of range.
     pub fn new(field_px: [usize; 2], pixel_um: f64, from: NucleiFrom) -> Result<Self, Error> {
-        let gauge = Gauge::new(&GaugeParams {
+        let measurer = Measurer::new(&MeasurerParams {
             pixel_um,
             nuclei_from: from,
             detail: papsynth_judge::Detail::Statistics,
-            ..GaugeParams::default()
+            ..MeasurerParams::default()
         })?;
         let window_px = [0, 1].map(|i| field_px[i].min(WINDOW_PX[i]));
-        Ok(Self { window_px, pixel_um, margin_px: whole(MARGIN_UM / pixel_um), from, gauge })
+        Ok(Self { window_px, pixel_um, margin_px: whole(MARGIN_UM / pixel_um), from, measurer })
     }
 
-    /// Columns and rows of what is simulated for a window.
+    /// Returns width and height of the field that is simulated for a window.
     #[must_use]
     pub fn simulated_px(&self) -> [usize; 2] {
         self.window_px.map(|side| side + 2 * self.margin_px)
     }
 
-    /// As many windows as a field holds, side by side about its middle.
+    /// Cuts a field into as many windows as fit, centred and without gaps.
     #[must_use]
-    pub fn windows(&self, field: &Picture) -> Vec<Picture> {
+    pub fn windows(&self, field: &FieldImage) -> Vec<FieldImage> {
         let size = [field.width, field.height()];
         let [across, down] = [0, 1].map(|i| (size[i] / self.window_px[i]).max(1));
         let [left, top] =
@@ -62,10 +62,10 @@ impl View {
         places.map(|(x, y)| self.cut(field, left + x * self.window_px[0], top + y * self.window_px[1])).collect()
     }
 
-    fn cut(&self, field: &Picture, left: usize, top: usize) -> Picture {
+    fn cut(&self, field: &FieldImage, left: usize, top: usize) -> FieldImage {
         let [wide, high] = self.window_px;
         let mut window = field.cut([left, top], [wide.min(field.width - left), high.min(field.height() - top)]);
-        if let Known::Points(points) = &mut window.nuclei {
+        if let NucleiAnnotation::Points(points) = &mut window.nuclei {
             let [right, bottom] = [wide, high].map(|side| side as f64 - 0.5);
             points.retain(|[x, y]| *x > -0.5 && *y > -0.5 && *x < right && *y < bottom);
         }
@@ -75,18 +75,26 @@ impl View {
     /// Simulates a window.
     ///
     /// # Errors
-    /// If the engine cannot make it.
-    pub fn simulate(&self, engine: &Engine, key: Key) -> Result<Picture, papsynth::Error> {
-        Ok(self.cut(&self.simulate_field(engine, key)?, self.margin_px, self.margin_px))
+    /// If the engine cannot render it; [`Error::Stopped`] if the stop flag is set.
+    pub fn simulate(&self, engine: &Engine, key: Key, control: &Control) -> Result<FieldImage, Error> {
+        Ok(self.cut(&self.simulate_with(engine, key, control)?, self.margin_px, self.margin_px))
     }
 
-    /// Simulates a whole field.
+    /// Simulates a complete field.
     ///
     /// # Errors
-    /// If the engine cannot make it.
-    pub fn simulate_field(&self, engine: &Engine, key: Key) -> Result<Picture, papsynth::Error> {
+    /// If the engine cannot render it.
+    pub fn simulate_field(&self, engine: &Engine, key: Key) -> Result<FieldImage, Error> {
+        self.simulate_with(engine, key, &Control::NONE)
+    }
+
+    fn simulate_with(&self, engine: &Engine, key: Key, control: &Control) -> Result<FieldImage, Error> {
+        control.check()?;
         let (mut grey, mut channels) = (Vec::new(), 1);
-        let finished = engine.stream::<papsynth::Error>(key, Threads::One, |plane| {
+        let scene = engine.scene(key)?;
+        control.check()?;
+        let finished = engine.image::<Error>(scene, Threads::One, |plane| {
+            control.check()?;
             grey.clone_from(&plane.grey);
             channels = plane.channels;
             Ok(())
@@ -95,30 +103,30 @@ impl View {
             papsynth::recipe::Number::Fixed(bits) => *bits,
             drawn => drawn.bounds()[1],
         };
-        /// Of colours, green: stains of nuclei and of cytoplasm absorb it most.
+        /// Colour images: green, which the stains of nuclei and cytoplasm absorb most.
         const GREEN: usize = 1;
         let channel = if channels == 3 { GREEN } else { 0 };
         let truth = &finished.truth;
-        Ok(Picture {
+        Ok(FieldImage {
             name: format!("{}", key.index),
             group: String::new(),
             grey: grey.iter().skip(channel).step_by(channels).map(|g| f32::from(*g)).collect(),
             width: truth.width,
             full_scale: single(libm::exp2(bits) - 1.0),
-            nuclei: self.known(&finished),
+            nuclei: self.annotation(&finished),
         })
     }
 
-    /// As much of the truth as is known of real fields.
-    fn known(&self, finished: &Finished) -> Known {
+    /// Returns the annotation that real fields also have.
+    fn annotation(&self, finished: &Finished) -> NucleiAnnotation {
         let truth = &finished.truth;
         match self.from {
-            NucleiFrom::Search => Known::Nothing,
-            NucleiFrom::Masks => Known::Masks(truth.labels(Group::Nucleus).ids),
+            NucleiFrom::Search => NucleiAnnotation::None,
+            NucleiFrom::Masks => NucleiAnnotation::Masks(truth.labels(Group::Nucleus).ids),
             NucleiFrom::Points => {
                 let pixel_um = finished.scene.view.pixel_um;
                 let nuclei = truth.objects.iter().filter(|o| o.group() == Group::Nucleus);
-                Known::Points(nuclei.map(|o| o.centre_um.map(|v| v / pixel_um - 0.5)).collect())
+                NucleiAnnotation::Points(nuclei.map(|o| o.centre_um.map(|v| v / pixel_um - 0.5)).collect())
             }
         }
     }

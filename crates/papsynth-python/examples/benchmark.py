@@ -1,6 +1,6 @@
-"""Which of two segmenters is better, and on what? Both on the same fields of several kinds of smears.
+"""Compares two nucleus segmenters on the same fields of several presets.
 
-Needs numpy and scipy. Prints F1 of the nuclei that are found.
+Needs numpy and scipy. Prints the F1 score of the nuclei.
 """
 
 import numpy as np
@@ -18,8 +18,6 @@ def main():
     for preset in PRESETS:
         recipe = papsynth.recipe(preset)
         recipe["field"] |= {"width_px": 640, "height_px": 480}
-        for mix in recipe["cells"].values():
-            mix["count"] = scaled(mix["count"], 640 * 480 / (1376 * 1038))
         counts = {name: np.zeros(3, dtype=int) for name in SEGMENTERS}
         for index in range(FIELDS):
             frame = papsynth.render(recipe, seed=5, index=index)
@@ -29,13 +27,6 @@ def main():
             table[preset, name] = f1(counts[name])
         print(f"{preset:12}" + "".join(f"{table[preset, name]:12.2f}" for name in SEGMENTERS), flush=True)
     return table
-
-
-def scaled(count, share):
-    """As many in a smaller field as lie on as much of a larger one."""
-    if isinstance(count, dict):
-        return {kind: [share * bound for bound in bounds] for kind, bounds in count.items()}
-    return share * count
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Two classical segmenters of nuclei and how they are scored: shared by the scripts beside it.
+"""Two classical nucleus segmenters and their scores, used by the other scripts.
 
 Needs numpy and scipy.
 """
@@ -8,14 +8,14 @@ from scipy import ndimage
 
 
 def absorbance(image):
-    """Decadic absorbance, with the empty slide estimated by the bright parts around each pixel."""
+    """Return the decadic absorbance. The light of the empty slide is estimated from bright pixels nearby."""
     light = np.maximum(image.astype(np.float32), 1)
     glass = ndimage.gaussian_filter(ndimage.maximum_filter(ndimage.gaussian_filter(light, 2), 61), 30)
     return np.log10(np.maximum(glass / light, 1e-3))
 
 
 def otsu(values):
-    """The threshold that parts values into the two classes that differ most (Otsu 1979)."""
+    """Return the threshold that maximises the between-class variance (Otsu 1979)."""
     counts, edges = np.histogram(values, 256)
     middles = (edges[:-1] + edges[1:]) / 2
     below, above = np.cumsum(counts), np.cumsum(counts[::-1])[::-1]
@@ -26,7 +26,7 @@ def otsu(values):
 
 
 def parts(mask, least_px, most_px):
-    """Connected parts of a mask whose size is that of a nucleus."""
+    """Return the connected components of a mask that are as large as nuclei."""
     labels, count = ndimage.label(ndimage.binary_fill_holes(ndimage.binary_opening(mask, iterations=2)))
     sizes = ndimage.sum_labels(np.ones_like(labels), labels, np.arange(count + 1))
     fits = (sizes >= least_px) & (sizes <= most_px)
@@ -36,27 +36,27 @@ def parts(mask, least_px, most_px):
 
 
 def by_threshold(image, pixel_um):
-    """What is darker than Otsu's threshold within the cells."""
+    """Segment pixels darker than Otsu's threshold within the cells."""
     dark = ndimage.gaussian_filter(absorbance(image), 1)
     cells = dark > otsu(dark)
     return parts(cells & (dark > otsu(dark[cells])), 12 / pixel_um**2, 400 / pixel_um**2)
 
 
 def by_contrast(image, pixel_um):
-    """What is darker than what lies around it, at the scale of a nucleus."""
+    """Segment pixels darker than their surroundings, by a difference of Gaussians."""
     dark = absorbance(image)
     small, large = (ndimage.gaussian_filter(dark, sigma / pixel_um) for sigma in (0.6, 6.0))
     return parts(small - large > 0.06, 12 / pixel_um**2, 400 / pixel_um**2)
 
 
 def truth_of(frame):
-    """Complete masks of the nuclei that are large enough to count."""
+    """Return the complete masks of all nuclei of 12 µm² or more."""
     nuclei = (frame.table["part"] == "nucleus") & (frame.table["area_um2"] >= 12)
     return frame.masks[nuclei]
 
 
 def score(found, masks):
-    """True positives, false positives and false negatives: a nucleus is found if a part shares half of their union with it."""
+    """Return true positives, false positives and false negatives at an intersection over union of 0.5."""
     hits, taken = 0, set()
     for mask in masks:
         numbers, counts = np.unique(found[mask], return_counts=True)

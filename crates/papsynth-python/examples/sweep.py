@@ -1,6 +1,6 @@
-"""Where does a classical segmenter break? Controlled changes of one thing at a time: the paper's parameter study by brute force.
+"""Measures a classical segmenter while one parameter of the recipe varies.
 
-Needs numpy and scipy. Prints a table: F1 of the nuclei that are found, over defocus, debris and illumination.
+Needs numpy and scipy. Prints the F1 score of the nuclei against defocus, debris and illumination.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ STUDIES = {
 
 
 def with_value(recipe, field, value):
-    """A copy of a recipe in which a field has another value."""
+    """Return a complete recipe with another value of a field."""
     *sections, name = field.split(".")
     whole = papsynth.recipe(recipe)
     inner = whole

@@ -1,8 +1,9 @@
-"""Trains a small segmenter of nuclei on synthetic fields alone, and scores it on other synthetic fields and on real ones.
+"""Trains a nucleus segmenter on synthetic fields and scores it on other synthetic fields and on real ones.
 
 Usage: python train.py [FOLDER]
 
-FOLDER holds real fields as PNG, each with a CSV file of its name, a line `y,x` for the middle of each nucleus. Needs numpy, scipy, scikit-learn and Pillow.
+FOLDER contains real fields as PNG, each with a CSV file of the same name: a line `y,x` for the centre of each nucleus. Needs
+numpy, scipy, scikit-learn and Pillow.
 """
 
 import csv
@@ -22,7 +23,7 @@ PIXELS_A_FIELD = 3000
 
 
 def features(image):
-    """What is around each pixel, at several scales."""
+    """Return features of each pixel at several scales."""
     dark = absorbance(image)
     blurred = [ndimage.gaussian_filter(dark, sigma) for sigma in (0.7, 1.5, 3, 6, 12)]
     edges = [np.hypot(ndimage.sobel(layer, 0), ndimage.sobel(layer, 1)) for layer in blurred[:3]]
@@ -36,7 +37,7 @@ def train():
     inputs, targets = [], []
     for frame in samples:
         inside = frame.masks[frame.table["part"] == "nucleus"].any(axis=0)
-        # As many pixels within nuclei as elsewhere.
+        # Equal numbers of pixels inside and outside nuclei.
         for wanted in (inside, ~inside):
             places = np.flatnonzero(wanted)
             places = random.choice(places, min(PIXELS_A_FIELD // 2, len(places)), replace=False)
@@ -60,7 +61,7 @@ def on_synthetic(forest):
 
 
 def on_real(forest, folder):
-    """A nucleus is found if its middle lies in a part that holds no other."""
+    """Score real fields: a nucleus is found if its centre is in a segment of its own."""
     from PIL import Image
 
     counts = np.zeros(3, dtype=int)
@@ -85,7 +86,7 @@ def main(folder=None):
     print(f"other synthetic fields: F1 {synthetic:.2f}")
     real = None
     if folder is None:
-        print("no folder of real fields was given")
+        print("real fields: not scored, no folder given")
     else:
         counts = on_real(forest, Path(folder))
         real = f1(counts)

@@ -1,4 +1,4 @@
-//! Arrays that Python hands over: of numbers, of the right shape, and finite.
+//! Conversion of Python arrays, with checks of type, shape and finite values.
 
 use numpy::{Element, PyArray2, PyArrayMethods, dtype};
 use pyo3::exceptions::PyTypeError;
@@ -6,17 +6,17 @@ use pyo3::prelude::*;
 
 use crate::error::wrong;
 
-/// Anything that NumPy may make an array of.
-pub(crate) type Given<'py> = Bound<'py, PyAny>;
+/// Any object that NumPy can convert to an array.
+pub(crate) type ArrayLike<'py> = Bound<'py, PyAny>;
 
-/// Numbers row by row, with rows and columns.
-fn numbers<T: Element + Copy + Into<f64>>(name: &str, given: &Given<'_>) -> PyResult<(Vec<T>, [usize; 2])> {
+/// Returns the values, row-major, and the numbers of rows and columns.
+fn numbers<T: Element + Copy + Into<f64>>(name: &str, given: &ArrayLike<'_>) -> PyResult<(Vec<T>, [usize; 2])> {
     let py = given.py();
-    let told = |error: PyErr| PyTypeError::new_err(format!("{name}: {}; expected an array", error.value(py)));
-    let array = py.import("numpy")?.call_method1("asarray", (given,)).map_err(told)?;
+    let not_array = |error: PyErr| PyTypeError::new_err(format!("{name}: expected an array ({})", error.value(py)));
+    let array = py.import("numpy")?.call_method1("asarray", (given,)).map_err(not_array)?;
     let found = array.getattr("dtype")?;
     if !["b", "i", "u", "f"].contains(&found.getattr("kind")?.extract::<String>()?.as_str()) {
-        return Err(PyTypeError::new_err(format!("{name}: is of type {found}; expected bool, whole or real numbers")));
+        return Err(PyTypeError::new_err(format!("{name}: expected booleans, integers or floats, found {found}")));
     }
     let shape: Vec<usize> = array.getattr("shape")?.extract()?;
     // An empty list has one dimension.
@@ -24,7 +24,7 @@ fn numbers<T: Element + Copy + Into<f64>>(name: &str, given: &Given<'_>) -> PyRe
         return Ok((Vec::new(), [0, shape.get(1).copied().unwrap_or(0)]));
     }
     let &[rows, columns] = shape.as_slice() else {
-        return Err(wrong(format!("{name}: has the shape {shape:?}; expected two dimensions")));
+        return Err(wrong(format!("{name}: expected two dimensions, found the shape {shape:?}")));
     };
     let array = array.call_method1("astype", (dtype::<T>(py),))?;
     let array = array.cast::<PyArray2<T>>()?;
@@ -32,39 +32,39 @@ fn numbers<T: Element + Copy + Into<f64>>(name: &str, given: &Given<'_>) -> PyRe
     match values.iter().position(|&value| !value.into().is_finite()) {
         Some(place) => {
             let (row, column, value) = (place / columns, place % columns, values[place].into());
-            Err(wrong(format!("{name}[{row}, {column}]: {value}; expected finite numbers")))
+            Err(wrong(format!("{name}[{row}, {column}]: {value} is out of range: expected a finite number")))
         }
         None => Ok((values, [rows, columns])),
     }
 }
 
-/// The pixels of an image row by row, and its width.
-pub(crate) fn pixels(name: &str, image: &Given<'_>) -> PyResult<(Vec<f32>, usize)> {
+/// Returns the pixels of an image, row-major, and its width.
+pub(crate) fn pixels(name: &str, image: &ArrayLike<'_>) -> PyResult<(Vec<f32>, usize)> {
     let (values, [_, width]) = numbers(name, image)?;
     if values.is_empty() {
-        return Err(wrong(format!("{name}: has no pixel; expected (height, width)")));
+        return Err(wrong(format!("{name}: the image is empty; expected (height, width)")));
     }
     Ok((values, width))
 }
 
-/// The same, of values that lie between two.
-pub(crate) fn pixels_within(name: &str, image: &Given<'_>, [low, high]: [f32; 2]) -> PyResult<(Vec<f32>, usize)> {
+/// Returns the pixels of an image with values in a range, and its width.
+pub(crate) fn pixels_within(name: &str, image: &ArrayLike<'_>, [low, high]: [f32; 2]) -> PyResult<(Vec<f32>, usize)> {
     let (values, width) = pixels(name, image)?;
     match values.iter().position(|value| !(low..=high).contains(value)) {
         Some(place) => {
             let (row, column, value) = (place / width, place % width, values[place]);
-            let range = if high < f32::MAX { format!("{low} to {high}") } else { format!("at least {low}") };
-            Err(wrong(format!("{name}[{row}, {column}]: {value}; expected {range}")))
+            let range = if high < f32::MAX { format!("{low} to {high}") } else { format!("{low} or more") };
+            Err(wrong(format!("{name}[{row}, {column}]: {value} is out of range: expected {range}")))
         }
         None => Ok((values, width)),
     }
 }
 
-/// Points as rows of x and y; there may be none.
-pub(crate) fn points(name: &str, points: &Given<'_>) -> PyResult<Vec<[f64; 2]>> {
+/// Returns points from an array of shape (n, 2); n may be 0.
+pub(crate) fn points(name: &str, points: &ArrayLike<'_>) -> PyResult<Vec<[f64; 2]>> {
     let (values, [rows, columns]) = numbers::<f64>(name, points)?;
     if !values.is_empty() && columns != 2 {
-        let message = format!("{name}: has the shape [{rows}, {columns}]; expected rows of x and y, (n, 2)");
+        let message = format!("{name}: expected the shape (n, 2), found ({rows}, {columns})");
         return Err(wrong(message));
     }
     Ok(values.as_chunks::<2>().0.to_vec())

@@ -1,4 +1,4 @@
-//! Dictionaries of Python as the text of a recipe.
+//! Conversion of Python dictionaries to TOML.
 
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -7,16 +7,16 @@ use toml::{Table, Value};
 
 use crate::error::wrong;
 
-/// No recipe is nested as deep; a list that holds itself is.
-const DEEPEST: usize = 16;
+/// Maximum nesting depth: detects lists that contain themselves.
+const MAX_DEPTH: usize = 16;
 
-/// A dictionary as TOML; it lies at a path, so deep. That of a recipe lies at `""`, 0.
+/// Converts a dictionary at a path and depth to TOML. A recipe has the path `""` and depth 0.
 pub(crate) fn table(dict: &Bound<'_, PyDict>, path: &str, depth: usize) -> PyResult<Table> {
     let mut table = Table::new();
     for (key, value) in dict {
         let Ok(key) = key.cast::<PyString>() else {
             let path = if path.is_empty() { "recipe" } else { path };
-            return Err(PyTypeError::new_err(format!("{path}: {} is no name of a field", key.repr()?)));
+            return Err(PyTypeError::new_err(format!("{path}: expected a field name (string), found {}", key.repr()?)));
         };
         let key = key.to_str()?.to_owned();
         let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
@@ -26,8 +26,8 @@ pub(crate) fn table(dict: &Bound<'_, PyDict>, path: &str, depth: usize) -> PyRes
 }
 
 fn value(value: &Bound<'_, PyAny>, path: &str, depth: usize) -> PyResult<Value> {
-    if depth > DEEPEST {
-        return Err(wrong(format!("{path}: nested deeper than any recipe")));
+    if depth > MAX_DEPTH {
+        return Err(wrong(format!("{path}: nested too deeply")));
     }
     if let Ok(truth) = value.cast::<PyBool>() {
         return Ok(Value::Boolean(truth.is_true()));
@@ -44,12 +44,12 @@ fn value(value: &Bound<'_, PyAny>, path: &str, depth: usize) -> PyResult<Value> 
     }
     if value.is_instance_of::<PyInt>() {
         let whole = value.extract::<i64>();
-        return whole.map(Value::Integer).map_err(|_| wrong(format!("{path}: {} is too large", repr(value))));
+        return whole.map(Value::Integer).map_err(|_| wrong(format!("{path}: {} is out of range: expected a 64-bit integer", repr(value))));
     }
     if value.is_instance_of::<PyFloat>() {
         return Ok(Value::Float(value.extract()?));
     }
-    // Numbers of NumPy, and a distribution or section that knows how it is written.
+    // Sections and distributions of `papsynth.recipes`, then NumPy scalars.
     if let Ok(true) = value.hasattr("to_dict")
         && let Ok(inner) = value.call_method0("to_dict")
     {
@@ -62,12 +62,12 @@ fn value(value: &Bound<'_, PyAny>, path: &str, depth: usize) -> PyResult<Value> 
     }
     let kind = value.get_type().name()?.to_string();
     Err(PyTypeError::new_err(format!(
-        "{path}: {} is a {kind}; expected a number, a text, a truth value, a list or a dictionary",
+        "{path}: expected a number, string, boolean, list or dictionary, found {} ({kind})",
         repr(value)
     )))
 }
 
-/// A value as Python shows it, or its beginning.
+/// Returns the first 80 characters of the `repr` of a value.
 fn repr(value: &Bound<'_, PyAny>) -> String {
     let text = value.repr().map(|text| text.to_string()).unwrap_or_default();
     text.chars().take(80).collect()

@@ -1,4 +1,4 @@
-//! Engines and what they make.
+//! The class `Engine`, and recipes, models and scenes from Python objects.
 
 use std::fs;
 use std::io::Read;
@@ -11,7 +11,7 @@ use papsynth::recipe::{Preset, Recipe, diagnose};
 use papsynth::scene::Scene;
 use papsynth::{Plane, Threads};
 use papsynth_dataset::Layout;
-use papsynth_dataset::memory::{Need, available};
+use papsynth_dataset::memory::{MemoryEstimate, available};
 use papsynth_dataset::read::{InputFile, Limits, read_inputs};
 use pyo3::exceptions::{PyFileNotFoundError, PyMemoryError, PyOSError, PyTypeError};
 use pyo3::prelude::*;
@@ -21,31 +21,32 @@ use crate::error::wrong;
 use crate::frame::Frame;
 use crate::{convert, error, pool};
 
-const LARGEST_RECIPE: u64 = 1 << 20;
+const MAX_RECIPE_BYTES: u64 = 1 << 20;
 
-const LARGEST_MODEL: u64 = 1 << 28;
+const MAX_MODEL_BYTES: u64 = 1 << 28;
 
-const LARGEST_SCENE: u64 = 1 << 30;
+const MAX_SCENE_BYTES: u64 = 1 << 30;
 
-/// Makes the images of one recipe.
+/// Render images of a recipe.
 ///
 /// Parameters
 /// ----------
 /// recipe : None, str, os.PathLike or dict
-///     Nothing for the default, the name of a preset, the path of a TOML file, or fields by section; what is left out is the default.
+///     None for the default, the name of a preset, the path of a TOML file, or a dictionary of sections. Omitted
+///     fields have their defaults.
 /// model : None, dict, str or os.PathLike
-///     A model, such as `papsynth.learn` returns, or the path of a model or class file, laid over the model that ships.
+///     A model, such as `papsynth.learn` returns, or the path of a model or class file; extends the built-in model.
 ///
 /// Raises
 /// ------
 /// RecipeError
-///     If a field of the recipe cannot be what it is; names the field.
+///     If a field of the recipe is invalid; the message names it.
 /// OSError
 ///     If a file cannot be read.
 /// ValueError
-///     If the model cannot be used.
+///     If the model is invalid.
 /// MemoryError
-///     If the largest frame of the recipe needs more memory than there is, where the system tells.
+///     If the largest frame of the recipe may need more memory than is available.
 #[pyclass(frozen, module = "papsynth")]
 pub(crate) struct Engine {
     pub(crate) engine: Arc<papsynth::Engine>,
@@ -54,6 +55,7 @@ pub(crate) struct Engine {
     pub(crate) source: String,
 }
 
+/// Why rendering ended early.
 enum Stop {
     Engine(papsynth::Error),
     Python(PyErr),
@@ -78,7 +80,7 @@ impl Engine {
         }
         let (inputs, map) =
             read_inputs(&mut recipe, &folder, &Limits::default()).map_err(|error| error::dataset(&error))?;
-        let need = Need::of(&recipe, &Layout::default());
+        let need = MemoryEstimate::of(&recipe, &Layout::default());
         if let Some(bytes) = available().filter(|bytes| need.of_one_frame() > *bytes as f64) {
             return Err(PyMemoryError::new_err(need.too_large(&recipe, bytes)));
         }
@@ -87,19 +89,19 @@ impl Engine {
         Ok(Self { engine: Arc::new(engine), model, map, source: name })
     }
 
-    /// Makes an image and its truth.
+    /// Render an image with its ground truth.
     ///
     /// Parameters
     /// ----------
     /// seed : int
-    ///     The data set, 0 to 2**64 - 1.
+    ///     Seed of the data set, 0 to 2**64 - 1.
     /// index : int
-    ///     The image in it, 0 to 2**64 - 1.
+    ///     Index of the image, 0 to 2**64 - 1.
     /// threads : int
-    ///     Threads that work on it, 1 for the calling one alone, 0 for as many as there are processors. The bytes are the same.
+    ///     Number of threads: 1 for the calling thread only, 0 for all processors. The result does not depend on it.
     /// scene : None, dict, str or os.PathLike
-    ///     A scene to image in place of the one of seed and index: as `scene` returns it, or the path of a JSON file that
-    ///     `papsynth generate --scenes` wrote.
+    ///     Scene to render instead of the one of seed and index: a dictionary such as `scene` returns, or the path of a
+    ///     JSON file that `papsynth generate --scenes` wrote.
     ///
     /// Returns
     /// -------
@@ -108,9 +110,9 @@ impl Engine {
     /// Raises
     /// ------
     /// ValueError
-    ///     If the scene cannot be drawn, or is not valid; names the object and the field.
+    ///     If the scene is invalid; the message names the object and the field.
     /// KeyboardInterrupt
-    ///     Between the planes of a stack.
+    ///     On Ctrl-C, between the planes of a stack.
     #[pyo3(signature = (seed=0, index=0, *, threads=1, scene=None))]
     fn render(
         &self,
@@ -135,17 +137,17 @@ impl Engine {
         Frame::new(py, frame)
     }
 
-    /// Draws what lies in an image: every object with its place, depth, size and stain, and how it is imaged.
+    /// Draw the scene of an image: every object with position, depth, size and stain, and the imaging parameters.
     ///
     /// Parameters
     /// ----------
     /// seed, index : int
-    ///     As of `render`.
+    ///     As for `render`.
     ///
     /// Returns
     /// -------
     /// dict
-    ///     The scene, which `render` takes back: change it, and render it again.
+    ///     The scene. Change it and pass it to `render`.
     ///
     /// Raises
     /// ------
@@ -165,7 +167,7 @@ impl Engine {
         py.import("json")?.call_method1("loads", (scene.to_json(),))
     }
 
-    /// SHA-256 of recipe, model and versions: two engines with the same make the same images.
+    /// SHA-256 of recipe, model and versions. Engines with equal identity render equal images.
     #[getter]
     fn identity(&self, py: Python<'_>) -> PyResult<String> {
         let text = format!("{}\n{}\n{}", identity(), self.engine.recipe().to_toml(), self.model.to_json());
@@ -173,13 +175,13 @@ impl Engine {
         hash.call_method0("hexdigest")?.extract()
     }
 
-    /// Whether the recipe names a file, such as a map of places.
+    /// Whether the recipe refers to a file, such as a density map.
     #[getter]
     fn names_files(&self) -> bool {
         self.map.is_some()
     }
 
-    /// The recipe with everything that was left out, as TOML.
+    /// The complete recipe as TOML.
     #[getter]
     fn recipe(&self) -> String {
         self.engine.recipe().to_toml()
@@ -190,7 +192,7 @@ impl Engine {
     }
 }
 
-/// Makes a frame, and looks between its planes whether Python wants to stop.
+/// Renders a frame and checks Python signals between planes.
 fn render(engine: &papsynth::Engine, scene: Scene, threads: Threads) -> Result<papsynth::Frame, Stop> {
     let mut planes: Vec<Plane> = Vec::new();
     let finished = engine.image(scene, threads, |plane| {
@@ -202,14 +204,14 @@ fn render(engine: &papsynth::Engine, scene: Scene, threads: Threads) -> Result<p
 
 pub(crate) struct Source {
     pub(crate) recipe: Recipe,
-    /// Files that it names are relative to this.
+    /// Base of relative paths in the recipe.
     pub(crate) folder: PathBuf,
-    /// What messages call it.
+    /// Name of the recipe in messages.
     pub(crate) name: String,
 }
 
 impl Source {
-    /// Reads whatever may stand for a recipe.
+    /// Reads a recipe from None, a preset name, a path or a dictionary.
     pub(crate) fn read(py: Python<'_>, recipe: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let of_preset = |preset: Preset| Self {
             recipe: preset.recipe(),
@@ -236,17 +238,17 @@ impl Source {
         let presets = || Preset::ALL.map(Preset::name).join(", ");
         let path: PathBuf = recipe.extract().map_err(|_| {
             PyTypeError::new_err(format!(
-                "recipe: {} is none; expected None, a dictionary, the path of a TOML file or one of {}",
-                recipe.get_type(),
-                presets()
+                "recipe: expected None, a dictionary, the path of a TOML file or one of {}; found {}",
+                presets(),
+                recipe.get_type()
             ))
         })?;
         if !path.exists() {
             let (path, presets) = (path.display(), presets());
-            let message = format!("recipe: there is no file {path}, nor a preset of that name: {presets}");
+            let message = format!("recipe: no file or preset `{path}`; presets: {presets}");
             return Err(PyFileNotFoundError::new_err(message));
         }
-        let text = read(&path, LARGEST_RECIPE)?;
+        let text = read(&path, MAX_RECIPE_BYTES)?;
         let name = path.display().to_string();
         let recipe = diagnose::read(&text).map_err(|faults| error::recipe(py, &name, &faults))?;
         let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
@@ -254,19 +256,19 @@ impl Source {
     }
 }
 
-/// The model that ships, with the classes of a file, or of a dictionary such as `papsynth.learn` returns.
+/// Returns the built-in model, extended by a file or a dictionary.
 pub(crate) fn read_model(py: Python<'_>, model: Option<&Bound<'_, PyAny>>) -> PyResult<Model> {
     let Some(model) = model.filter(|model| !model.is_none()) else { return Ok(Model::builtin()) };
-    let (name, text) = json(py, model, "the model", LARGEST_MODEL)?;
+    let (name, text) = json(py, model, "the model", MAX_MODEL_BYTES)?;
     Model::builtin().with(&text).map_err(|error| wrong(format!("{name}: {error}")))
 }
 
 fn read_scene(py: Python<'_>, scene: &Bound<'_, PyAny>) -> PyResult<Scene> {
-    let (name, text) = json(py, scene, "the scene", LARGEST_SCENE)?;
+    let (name, text) = json(py, scene, "the scene", MAX_SCENE_BYTES)?;
     Scene::from_json(&text).map_err(|error| wrong(format!("{name}: {error}")))
 }
 
-/// The name and the text of a file, or of a dictionary as JSON.
+/// Returns name and text of a file, or of a dictionary as JSON.
 fn json(py: Python<'_>, given: &Bound<'_, PyAny>, name: &str, largest: u64) -> PyResult<(String, String)> {
     if given.is_instance_of::<PyDict>() {
         return Ok((name.to_owned(), py.import("json")?.call_method1("dumps", (given,))?.extract()?));
@@ -278,23 +280,23 @@ fn json(py: Python<'_>, given: &Bound<'_, PyAny>, name: &str, largest: u64) -> P
 fn read(path: &Path, largest: u64) -> PyResult<String> {
     let named =
         |error: std::io::Error| PyErr::from(std::io::Error::new(error.kind(), format!("{}: {error}", path.display())));
-    // Not everything that can be read says how long it is.
+    // Special files do not report their length.
     let mut text = String::new();
     let read = fs::File::open(path).and_then(|file| file.take(largest + 1).read_to_string(&mut text));
     if read.map_err(named)? as u64 > largest {
-        let message = format!("{}: more than {largest} bytes; expected at most that", path.display());
+        let message = format!("{}: the file is too large: expected at most {largest} bytes", path.display());
         return Err(PyOSError::new_err(message));
     }
     Ok(text)
 }
 
-/// The JSON schema of recipes, as text.
+/// Returns the JSON schema of recipes.
 #[pyfunction]
 pub(crate) fn recipe_schema() -> String {
     Recipe::schema().to_string()
 }
 
-/// A recipe, as of `Engine`, with everything that was left out, as TOML.
+/// Returns a complete recipe as TOML.
 #[pyfunction]
 #[pyo3(signature = (recipe=None))]
 pub(crate) fn resolve(py: Python<'_>, recipe: Option<&Bound<'_, PyAny>>) -> PyResult<String> {

@@ -1,27 +1,27 @@
-//! What goes wrong, as Python's exceptions.
+//! Conversion of errors to Python exceptions.
 
 use papsynth::recipe::diagnose::Fault;
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 
-/// What a value or a library has against what was asked for.
+/// Returns a `ValueError`.
 pub(crate) fn wrong(error: impl std::fmt::Display) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-/// A `papsynth.RecipeError` of these faults, each as its field, what is wrong with it and what would help.
+/// Returns a `papsynth.RecipeError` with field, message and help of each invalid field.
 pub(crate) fn recipe(py: Python<'_>, source: &str, faults: &[Fault]) -> PyErr {
-    let told: Vec<(String, String, Option<String>)> =
+    let errors: Vec<(String, String, Option<String>)> =
         faults.iter().map(|fault| (fault.path.join("."), fault.message.clone(), fault.help.clone())).collect();
     let raise = || -> PyResult<PyErr> {
         let class = py.import("papsynth._errors")?.getattr("RecipeError")?;
-        Ok(PyErr::from_value(class.call1((source, PyList::new(py, told)?))?))
+        Ok(PyErr::from_value(class.call1((source, PyList::new(py, errors)?))?))
     };
     raise().unwrap_or_else(|error| error)
 }
 
-/// What the engine says against a recipe or a scene.
+/// Converts an error of the engine.
 pub(crate) fn engine(py: Python<'_>, source: &str, error: &papsynth::Error) -> PyErr {
     let fault = |field: &str, message: String| {
         let path = field.split('.').map(str::to_owned).collect();
@@ -37,8 +37,8 @@ pub(crate) fn engine(py: Python<'_>, source: &str, error: &papsynth::Error) -> P
     }
 }
 
-/// What reading files says.
+/// Converts an error of reading or writing files.
 pub(crate) fn dataset(error: &papsynth_dataset::Error) -> PyErr {
-    let is_of_system = matches!(error, papsynth_dataset::Error::Io { .. });
-    if is_of_system { PyOSError::new_err(error.to_string()) } else { wrong(error) }
+    let is_io = matches!(error, papsynth_dataset::Error::Io { .. });
+    if is_io { PyOSError::new_err(error.to_string()) } else { wrong(error) }
 }

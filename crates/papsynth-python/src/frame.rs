@@ -1,5 +1,4 @@
-//! Images and their truth as arrays, and frames as pickle keeps them: their arrays, and what is known of each object, its masks
-//! as counts of pixels.
+//! Frames as NumPy arrays, and their pickled form: the arrays and the ground truth, with masks as run lengths.
 
 use std::path::PathBuf;
 use std::sync::OnceLock;
@@ -15,28 +14,30 @@ use pyo3::types::{PyBytes, PyDict, PyList};
 
 use crate::error::{self, wrong};
 
-/// An image or focus stack, with everything that is known of it. Arrays are the frame's own, whoever asks for them: copy them before you change them.
+/// An image or focus stack with its ground truth. Arrays are cached and shared: copy them before you change them.
 ///
 /// Attributes
 /// ----------
 /// image : ndarray
-///     (height, width), or (height, width, 3) in colour; uint8, or uint16 for more than 8 bits. Of a stack everything is in focus.
+///     (height, width), or (height, width, 3) in colour; uint8, or uint16 for more than 8 bits. The extended depth of field of a
+///     stack.
 /// stack : ndarray
-///     (planes, height, width[, 3]), the same type; of an image its one plane.
+///     (planes, height, width[, 3]), the same type; one plane for an image.
 /// noise_free : ndarray
 ///     float32, as `stack`: the expected grey levels, before noise and rounding.
 /// labels : dict of str to ndarray
-///     (height, width), int32, of "cytoplasm", "nucleus" and "debris": the id of the front-most object at each pixel, 0 where there is none.
+///     (height, width), int32, of "cytoplasm", "nucleus" and "debris": the id of the visible object at each
+///     pixel, 0 for none.
 /// layers : ndarray
 ///     (height, width), uint16: number of cytoplasms at each pixel.
 /// masks, visible_masks : ndarray
-///     (objects, height, width), bool: complete, and where they are front-most within their group.
+///     (objects, height, width), bool: complete masks, and those not hidden by objects of the same group.
 /// boxes : ndarray
-///     (objects, 4), int32: x0, y0, x1, y1 of the complete masks, the last ones exclusive.
+///     (objects, 4), int32: x0, y0, x1, y1 of the complete masks; x1 and y1 are exclusive.
 /// rle, visible_rle : list of dict
-///     The masks as pycocotools reads them.
+///     Run lengths of the masks, as pycocotools reads them.
 /// table : dict of str to ndarray
-///     A column each, a row for every object and part: class, places in um, areas and so on.
+///     Columns with a value per object part: class, position in µm, area, ….
 /// defocus_um, detectability : ndarray
 ///     (objects, planes), float64.
 #[pyclass(frozen, module = "papsynth")]
@@ -60,11 +61,11 @@ pub(crate) struct Frame {
     #[pyo3(get)]
     noise_free: Py<PyAny>,
     truth: Truth,
-    kept: Kept,
+    cache: Cache,
 }
 
 #[derive(Default)]
-struct Kept {
+struct Cache {
     labels: OnceLock<Py<PyAny>>,
     layers: OnceLock<Py<PyAny>>,
     masks: OnceLock<Py<PyAny>>,
@@ -74,7 +75,7 @@ struct Kept {
 
 impl Frame {
     pub(crate) fn new(py: Python<'_>, frame: papsynth::Frame) -> PyResult<Self> {
-        let picture = frame.picture();
+        let picture = frame.image();
         let papsynth::Frame { planes, finished } = frame;
         let scene = &finished.scene;
         let (bits, channels) = (scene.camera.bits, planes.first().map_or(1, |plane| plane.channels));
@@ -112,7 +113,7 @@ impl Frame {
             stack: levels(grey, shape(Some(count)))?,
             noise_free: array(py, noise_free, shape(Some(count)))?,
             truth: finished.truth,
-            kept: Kept::default(),
+            cache: Cache::default(),
         })
     }
 
@@ -150,7 +151,7 @@ impl Frame {
 impl Frame {
     #[getter]
     fn labels(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        kept(py, &self.kept.labels, || {
+        cached(py, &self.cache.labels, || {
             let Truth { width, height, .. } = self.truth;
             let dict = PyDict::new(py);
             for group in Group::ALL {
@@ -166,22 +167,22 @@ impl Frame {
     #[getter]
     fn layers(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         let Truth { width, height, .. } = self.truth;
-        kept(py, &self.kept.layers, || array(py, py.detach(|| self.truth.layers()), vec![height, width]))
+        cached(py, &self.cache.layers, || array(py, py.detach(|| self.truth.layers()), vec![height, width]))
     }
 
     #[getter]
     fn masks(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        kept(py, &self.kept.masks, || self.masks_of(py, |object| &object.amodal))
+        cached(py, &self.cache.masks, || self.masks_of(py, |object| &object.amodal))
     }
 
     #[getter]
     fn visible_masks(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        kept(py, &self.kept.visible_masks, || self.masks_of(py, |object| &object.front))
+        cached(py, &self.cache.visible_masks, || self.masks_of(py, |object| &object.visible))
     }
 
     #[getter]
     fn boxes(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        #[expect(clippy::cast_possible_wrap, reason = "images are smaller than 2³¹ pixels a side")]
+        #[expect(clippy::cast_possible_wrap, reason = "images have fewer than 2³¹ rows and columns")]
         let of = |bounds: Bounds| {
             [bounds.x, bounds.y, bounds.x + bounds.width, bounds.y + bounds.height].map(|side| side as i32)
         };
@@ -197,7 +198,7 @@ impl Frame {
 
     #[getter]
     fn visible_rle(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        self.rle_of(py, |object| &object.front)
+        self.rle_of(py, |object| &object.visible)
     }
 
     #[getter]
@@ -212,7 +213,7 @@ impl Frame {
 
     #[getter]
     fn table(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        kept(py, &self.kept.table, || {
+        cached(py, &self.cache.table, || {
             let dict = PyDict::new(py);
             let count = self.truth.objects.len();
             for (name, column) in columns(&self.truth, self.index) {
@@ -221,7 +222,7 @@ impl Frame {
                     Column::Number(values) => array(py, values, vec![count])?,
                     Column::Flag(values) => array(py, values, vec![count])?,
                     Column::Text(values) => text(py, values)?,
-                    // In arrays of their own, one value a plane.
+                    // Arrays with a value per plane have their own attributes.
                     Column::Numbers(_) => continue,
                 };
                 dict.set_item(name, values)?;
@@ -230,17 +231,18 @@ impl Frame {
         })
     }
 
-    /// Writes `image` as PNG, with the size of its pixels; a former file is replaced.
+    /// Write `image` as PNG with its pixel size. An existing file is replaced.
     ///
     /// Parameters
     /// ----------
     /// path : str or os.PathLike
+    ///     The file.
     ///
     /// Raises
     /// ------
     /// OSError
-    ///     If the system refuses; then there is no such file, or still the former one.
-    #[expect(clippy::needless_pass_by_value, reason = "Python hands it over")]
+    ///     If the file cannot be written. An existing file is then unchanged.
+    #[expect(clippy::needless_pass_by_value, reason = "owned argument of Python")]
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let image = self.image.bind(py);
         let levels: Vec<u16> = match image.cast::<PyArrayDyn<u8>>() {
@@ -276,10 +278,10 @@ impl Frame {
     }
 }
 
-/// Version; seed, index, slide; µm of a pixel, planes, bits, width and height; image, stack and light without noise; objects.
+/// Version; seed, index, slide; pixel size, planes, bits, width and height; image, stack and noise-free image; objects.
 type Pickled = (u32, (u64, u64, u64), (f64, Vec<f64>, u32, [usize; 2]), [Py<PyAny>; 3], Vec<PickledObject>);
 
-/// A frame that was pickled.
+/// Restores a pickled frame.
 #[pyfunction]
 #[pyo3(name = "_restored")]
 pub(crate) fn restored(
@@ -291,25 +293,25 @@ pub(crate) fn restored(
     objects: Vec<PickledObject>,
 ) -> PyResult<Frame> {
     if version != PICKLED {
-        let message = format!("this frame was pickled in version {version} of its form; this papsynth reads {PICKLED}");
+        let message = format!("this frame was pickled in version {version}; expected version {PICKLED}");
         return Err(wrong(message));
     }
     let ((seed, index, slide), (pixel_um, planes_um, bits, [width, height])) = (key, scale);
     let [image, stack, noise_free] = arrays;
-    // What `save` and others take for granted.
+    // Shapes that other methods rely on.
     let [of_image, of_stack] = [&image, &stack].map(|array| array.bind(py).getattr("shape")?.extract::<Vec<usize>>());
     let (of_image, of_stack) = (of_image?, of_stack?);
     if of_image.get(..2) != Some(&[height, width][..])
         || of_stack.split_first() != Some((&planes_um.len(), &of_image[..]))
     {
-        return Err(damaged("its arrays are not as large as it says"));
+        return Err(damaged("array shapes do not match"));
     }
     let truth = restored_truth([width, height], planes_um.len(), objects)?;
-    Ok(Frame { seed, index, slide, pixel_um, planes_um, bits, image, stack, noise_free, truth, kept: Kept::default() })
+    Ok(Frame { seed, index, slide, pixel_um, planes_um, bits, image, stack, noise_free, truth, cache: Cache::default() })
 }
 
-/// What was made before, or is made now.
-fn kept(
+/// Returns a cached value, or computes and caches it.
+fn cached(
     py: Python<'_>,
     place: &OnceLock<Py<PyAny>>,
     make: impl FnOnce() -> PyResult<Py<PyAny>>,
@@ -318,11 +320,11 @@ fn kept(
         return Ok(found.clone_ref(py));
     }
     let made = make()?;
-    // Of two threads that asked at once, both get what the first made.
+    // If two threads compute the value, both return the first result.
     Ok(place.get_or_init(|| made).clone_ref(py))
 }
 
-/// An array of that shape, over the memory of the values.
+/// Creates an array that owns the values.
 fn array<T: Element>(py: Python<'_>, values: Vec<T>, shape: Vec<usize>) -> PyResult<Py<PyAny>> {
     values.into_pyarray(py).reshape(shape)?.into_py_any(py)
 }
@@ -332,10 +334,10 @@ fn text(py: Python<'_>, values: Vec<String>) -> PyResult<Py<PyAny>> {
     numpy.call_method1("array", (values, "U"))?.into_py_any(py)
 }
 
-/// Version of how frames are pickled: changes with everything below.
+/// Version of the pickled form.
 const PICKLED: u32 = 1;
 
-/// Id, group, kind, class, Bethesda category, traits; cluster, place, depth, stain, tint, direction, area, whether it is truncated; its masks;
+/// Id, group, kind, class, Bethesda category, traits; cluster, centre, depth, absorbance, tint, rotation, area, truncated; masks;
 /// defocus and detectability.
 type PickledObject = (
     (u32, String, String, String, String, String),
@@ -354,20 +356,20 @@ fn pickled_objects(truth: &Truth) -> Vec<PickledObject> {
                 o.cluster,
                 o.centre_um,
                 o.depth_um,
-                o.stain,
+                o.mean_absorbance,
                 o.tint_name().to_owned(),
                 o.rotation_deg,
                 o.area_um2,
                 o.truncated,
             ),
-            (rle::encode(&o.amodal, *width, *height), rle::encode(&o.front, *width, *height)),
+            (rle::encode(&o.amodal, *width, *height), rle::encode(&o.visible, *width, *height)),
             (o.defocus_um.clone(), o.detectability.clone()),
         )
     };
     objects.iter().map(object).collect()
 }
 
-/// The truth of a frame of so many planes.
+/// Restores the ground truth of a frame.
 fn restored_truth([width, height]: [usize; 2], planes: usize, objects: Vec<PickledObject>) -> PyResult<Truth> {
     let objects = objects.into_iter().map(|object| restored_object(object, [width, height], planes));
     Ok(Truth { width, height, objects: objects.collect::<PyResult<_>>()? })
@@ -380,12 +382,12 @@ fn restored_object(object: PickledObject, [width, height]: [usize; 2], planes: u
         (amodal, front),
         (defocus_um, detectability),
     ) = object;
-    let unknown = |what: &str, name: &str| damaged(&format!("object {id}: there is no {what} `{name}`"));
+    let unknown = |what: &str, name: &str| damaged(&format!("object {id}: unknown {what} `{name}`"));
     let mask = |counts: &str| {
         rle::decode(counts, width, height).map_err(|error: Problem| damaged(&format!("object {id}: {error}")))
     };
     if [defocus_um.len(), detectability.len()] != [planes; 2] {
-        return Err(damaged(&format!("object {id}: it is not seen in {planes} planes")));
+        return Err(damaged(&format!("object {id}: expected {planes} values per plane list")));
     }
     let part = match Group::ALL.into_iter().find(|one| one.name() == group) {
         Some(Group::Cytoplasm) => Part::Cytoplasm,
@@ -417,5 +419,5 @@ fn restored_object(object: PickledObject, [width, height]: [usize; 2], planes: u
 }
 
 fn damaged(what: &str) -> PyErr {
-    wrong(format!("this is no frame that was pickled: {what}"))
+    wrong(format!("invalid pickled frame: {what}"))
 }

@@ -1,26 +1,26 @@
-//! Classes of cells, learned from images and outlines, and how much synthetic fields are like real ones.
+//! Learning of classes, and comparison of synthetic with real fields.
 
 use papsynth::learn::{Donors, LearnParams, Material, NucleusImage};
-use papsynth_judge::{Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture};
+use papsynth_judge::{Field, FieldImage, Judge, JudgeParams, Measurer, MeasurerParams, NucleiAnnotation, NucleiFrom};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use crate::array::{Given, nth, pixels, pixels_within, points};
+use crate::array::{ArrayLike, nth, pixels, pixels_within, points};
 use crate::engine::read_model;
 use crate::error::wrong;
 use crate::pool;
 
-/// What `papsynth.learn` gives, where what is given is described, as JSON.
+/// Returns the model of `papsynth.learn` as JSON.
 #[pyfunction]
 #[pyo3(signature = (name, pixel_um, *, nuclei=None, nucleus_outlines=None, cytoplasm_outlines=None, like=None, bethesda="", source="", numbers_only=false, model=None))]
-#[expect(clippy::too_many_arguments, reason = "Python names them")]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
 pub(crate) fn learn(
     py: Python<'_>,
     name: &str,
     pixel_um: f64,
-    nuclei: Option<Vec<(Given<'_>, Given<'_>)>>,
-    nucleus_outlines: Option<Vec<Given<'_>>>,
-    cytoplasm_outlines: Option<Vec<Given<'_>>>,
+    nuclei: Option<Vec<(ArrayLike<'_>, ArrayLike<'_>)>>,
+    nucleus_outlines: Option<Vec<ArrayLike<'_>>>,
+    cytoplasm_outlines: Option<Vec<ArrayLike<'_>>>,
     like: Option<String>,
     bethesda: &str,
     source: &str,
@@ -37,7 +37,7 @@ pub(crate) fn learn(
     let nucleus_outlines = outlines("nucleus_outlines", nucleus_outlines)?;
     let cytoplasm_outlines = outlines("cytoplasm_outlines", cytoplasm_outlines)?;
     if nuclei.is_empty() && nucleus_outlines.is_empty() && cytoplasm_outlines.is_empty() {
-        let message = "nuclei, nucleus_outlines, cytoplasm_outlines: none is given; expected some material";
+        let message = "nuclei, nucleus_outlines, cytoplasm_outlines: expected at least one of these";
         return Err(wrong(message));
     }
     let material =
@@ -54,43 +54,43 @@ pub(crate) fn learn(
     Ok(learned.map_err(wrong)?.to_json())
 }
 
-fn nucleus(number: usize, image: &Given<'_>, mask: &Given<'_>) -> PyResult<NucleusImage> {
+fn nucleus(number: usize, image: &ArrayLike<'_>, mask: &ArrayLike<'_>) -> PyResult<NucleusImage> {
     let name = nth("nuclei", number);
     let (light, width) = pixels(&format!("{name}[0]"), image)?;
     let (mask, mask_width) = pixels_within(&format!("{name}[1]"), mask, [0.0, 1.0])?;
     if (light.len(), width) != (mask.len(), mask_width) {
         let [image, mask] = [(&light, width), (&mask, mask_width)].map(|(values, width)| (values.len() / width, width));
-        return Err(wrong(format!("{name}: image of {image:?}, mask of {mask:?}; expected one shape")));
+        return Err(wrong(format!("{name}: the image has the shape {image:?} and the mask {mask:?}; expected equal shapes")));
     }
     let mask = mask.into_iter().map(|inside| if inside > 0.5 { 1.0 } else { 0.0 }).collect();
     Ok(NucleusImage { name, light, mask, width })
 }
 
-fn outlines(name: &str, outlines: Option<Vec<Given<'_>>>) -> PyResult<Vec<Vec<[f64; 2]>>> {
+fn outlines(name: &str, outlines: Option<Vec<ArrayLike<'_>>>) -> PyResult<Vec<Vec<[f64; 2]>>> {
     let outlines = outlines.unwrap_or_default();
-    let one = |(number, outline): (usize, &Given<'_>)| {
+    let one = |(number, outline): (usize, &ArrayLike<'_>)| {
         let name = nth(name, number);
         let outline = points(&name, outline)?;
         match outline.len() {
-            0..3 => Err(wrong(format!("{name}: {} points; expected 3 or more", outline.len()))),
+            0..3 => Err(wrong(format!("{name}: expected 3 or more points, found {}", outline.len()))),
             _ => Ok(outline),
         }
     };
     outlines.iter().enumerate().map(one).collect()
 }
 
-/// The report of `papsynth.judge`, where what is given is described, as JSON.
+/// Returns the report of `papsynth.judge` as JSON.
 #[pyfunction]
 #[pyo3(signature = (real, synthetic, pixel_um, full_scale, *, real_nuclei=None, synthetic_nuclei=None, seed=0, quick=false, threads=0))]
-#[expect(clippy::too_many_arguments, reason = "Python names them")]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
 pub(crate) fn judge(
     py: Python<'_>,
-    real: Vec<Given<'_>>,
-    synthetic: Vec<Given<'_>>,
+    real: Vec<ArrayLike<'_>>,
+    synthetic: Vec<ArrayLike<'_>>,
     pixel_um: f64,
     full_scale: f32,
-    real_nuclei: Option<Vec<Given<'_>>>,
-    synthetic_nuclei: Option<Vec<Given<'_>>>,
+    real_nuclei: Option<Vec<ArrayLike<'_>>>,
+    synthetic_nuclei: Option<Vec<ArrayLike<'_>>>,
     seed: u64,
     quick: bool,
     threads: usize,
@@ -98,22 +98,22 @@ pub(crate) fn judge(
     let nuclei_from = match (&real_nuclei, &synthetic_nuclei) {
         (Some(_), Some(_)) => NucleiFrom::Points,
         (None, None) => NucleiFrom::Search,
-        _ => return Err(wrong("real_nuclei, synthetic_nuclei: both or neither must be given")),
+        _ => return Err(wrong("real_nuclei, synthetic_nuclei: expected both or neither")),
     };
     let sides = [
-        pictures("real", &real, real_nuclei.as_deref(), full_scale)?,
-        pictures("synthetic", &synthetic, synthetic_nuclei.as_deref(), full_scale)?,
+        field_images("real", &real, real_nuclei.as_deref(), full_scale)?,
+        field_images("synthetic", &synthetic, synthetic_nuclei.as_deref(), full_scale)?,
     ];
-    let gauge = Gauge::new(&GaugeParams { pixel_um, nuclei_from, ..GaugeParams::default() }).map_err(wrong)?;
+    let measurer = Measurer::new(&MeasurerParams { pixel_um, nuclei_from, ..MeasurerParams::default() }).map_err(wrong)?;
     let params = if quick { JudgeParams::quick() } else { JudgeParams::default() };
     let judge = Judge::new(&JudgeParams { seed, ..params }).map_err(wrong)?;
     let pool = pool::of(py, threads)?;
     let report = py.detach(|| {
         pool.install(|| {
-            let measured = sides.map(|pictures| {
-                let fields: Vec<Result<Field, String>> = pictures
+            let measured = sides.map(|images| {
+                let fields: Vec<Result<Field, String>> = images
                     .par_iter()
-                    .map(|picture| gauge.measure(picture).map_err(|error| format!("{}: {error}", picture.name)))
+                    .map(|image| measurer.measure(image).map_err(|error| format!("{}: {error}", image.name)))
                     .collect();
                 fields.into_iter().collect::<Result<Vec<Field>, String>>()
             });
@@ -124,20 +124,25 @@ pub(crate) fn judge(
     serde_json::to_string(&report.map_err(wrong)?).map_err(wrong)
 }
 
-fn pictures(side: &str, images: &[Given<'_>], nuclei: Option<&[Given<'_>]>, full_scale: f32) -> PyResult<Vec<Picture>> {
+fn field_images(
+    side: &str,
+    images: &[ArrayLike<'_>],
+    nuclei: Option<&[ArrayLike<'_>]>,
+    full_scale: f32,
+) -> PyResult<Vec<FieldImage>> {
     if images.len() < 2 {
-        return Err(wrong(format!("{side}: {} fields; expected 2 or more", images.len())));
+        return Err(wrong(format!("{side}: expected 2 or more fields, found {}", images.len())));
     }
     if nuclei.is_some_and(|nuclei| nuclei.len() != images.len()) {
-        return Err(wrong(format!("{side}_nuclei: must be as many as {side}, {}", images.len())));
+        return Err(wrong(format!("{side}_nuclei: expected one entry per field, {}", images.len())));
     }
-    let one = |(number, image): (usize, &Given<'_>)| {
+    let one = |(number, image): (usize, &ArrayLike<'_>)| {
         let (grey, width) = pixels(&nth(side, number), image)?;
         let nuclei = match nuclei {
-            None => Known::Nothing,
-            Some(nuclei) => Known::Points(points(&nth(&format!("{side}_nuclei"), number), &nuclei[number])?),
+            None => NucleiAnnotation::None,
+            Some(nuclei) => NucleiAnnotation::Points(points(&nth(&format!("{side}_nuclei"), number), &nuclei[number])?),
         };
-        Ok(Picture { name: format!("{side}[{number}]"), group: String::new(), grey, width, full_scale, nuclei })
+        Ok(FieldImage { name: format!("{side}[{number}]"), group: String::new(), grey, width, full_scale, nuclei })
     };
     images.iter().enumerate().map(one).collect()
 }

@@ -1,4 +1,4 @@
-//! The engine on NumPy arrays: what `papsynth._native` holds, over which `python/papsynth` lies.
+//! The native module `papsynth._native` of the Python package.
 #![forbid(unsafe_code)]
 
 mod array;
@@ -16,7 +16,7 @@ mod techniques;
 mod _native {
     use pyo3::prelude::*;
 
-    /// Finds NumPy's C interface now, and not where a signal may come in between.
+    /// Initialises NumPy's C API on import, where no signal interferes.
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         numpy::PyArray1::<u8>::zeros(module.py(), 0, false);

@@ -1,4 +1,4 @@
-//! Threads that frames share. A process that was forked has none of its parent's, so each makes its own.
+//! The thread pool. A forked process has no threads of its parent, so each process creates its own pool.
 
 use std::process;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -8,24 +8,24 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::wrong;
 
-const MOST: usize = 1024;
+const MAX_THREADS: usize = 1024;
 
-/// The pool of the process of that number, with so many threads.
-struct Own {
+/// The pool of a process.
+struct ProcessPool {
     process: u32,
     threads: usize,
     pool: Arc<ThreadPool>,
 }
 
-/// Held only by who is attached to the interpreter, as is whoever forks: in the child of a fork nobody holds it.
-static POOL: Mutex<Option<Own>> = Mutex::new(None);
+/// Locked only by threads attached to the interpreter, and so is a fork: the lock is free in a forked process.
+static POOL: Mutex<Option<ProcessPool>> = Mutex::new(None);
 
-/// The pool of this process with as many threads as are asked for, 0 for as many as there are processors.
+/// Returns the pool of this process with a number of threads; 0 means all processors.
 pub(crate) fn of(py: Python<'_>, threads: usize) -> PyResult<Arc<ThreadPool>> {
-    if threads > MOST {
-        return Err(wrong(format!("threads: {threads}; expected 0 to {MOST}")));
+    if threads > MAX_THREADS {
+        return Err(wrong(format!("threads: {threads} is out of range: expected 0 to {MAX_THREADS}")));
     }
-    if let Some(Own { process, threads: found, pool }) = POOL.lock().unwrap_or_else(PoisonError::into_inner).as_ref()
+    if let Some(ProcessPool { process, threads: found, pool }) = POOL.lock().unwrap_or_else(PoisonError::into_inner).as_ref()
         && *process == process::id()
         && *found == threads
     {
@@ -33,10 +33,10 @@ pub(crate) fn of(py: Python<'_>, threads: usize) -> PyResult<Arc<ThreadPool>> {
     }
     let built = py.detach(|| ThreadPoolBuilder::new().num_threads(threads).build());
     let pool = Arc::new(built.map_err(|error| wrong(format!("threads: {threads}: {error}")))?);
-    let own = Own { process: process::id(), threads, pool: Arc::clone(&pool) };
+    let own = ProcessPool { process: process::id(), threads, pool: Arc::clone(&pool) };
     let before = POOL.lock().unwrap_or_else(PoisonError::into_inner).replace(own);
-    // What a parent has left is not dropped: its threads are not there to be waited for.
-    if let Some(Own { process, pool, .. }) = before
+    // The pool of a parent is leaked: dropping it would wait for threads that do not exist.
+    if let Some(ProcessPool { process, pool, .. }) = before
         && process != process::id()
     {
         std::mem::forget(pool);
@@ -44,12 +44,12 @@ pub(crate) fn of(py: Python<'_>, threads: usize) -> PyResult<Arc<ThreadPool>> {
     Ok(pool)
 }
 
-/// Called in the child of a fork: what is left of the parent's threads is forgotten.
+/// Discards the pool of the parent in a forked process.
 #[pyfunction]
 #[pyo3(name = "_after_fork")]
 pub(crate) fn after_fork() {
     if let Ok(mut own) = POOL.try_lock()
-        && let Some(Own { pool, .. }) = own.take()
+        && let Some(ProcessPool { pool, .. }) = own.take()
     {
         std::mem::forget(pool);
     }

@@ -1,4 +1,4 @@
-//! Data sets on the disk.
+//! Data sets in files.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -6,30 +6,30 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use papsynth::Threads;
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Home, Layout, Progress, Run, Share, shards_to_make};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Layout, Location, Progress, Run, Task, missing_shards};
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyDict, PyList};
 
 use crate::engine::Engine;
 use crate::error::{self, wrong};
 
-/// How often it is looked whether Python wants to stop.
-const LOOK: Duration = Duration::from_millis(50);
+/// Interval at which Python signals are checked.
+const POLL: Duration = Duration::from_millis(50);
 
-/// Most frames whose shards are listed.
-const MOST_FRAMES: u64 = 1_000_000_000;
+/// Maximum number of frames whose shards are listed.
+const MAX_FRAMES: u64 = 1_000_000_000;
 
-/// What `papsynth.generate` does, where what is given is described: numbers of frames that were "kept" and "made".
+/// Generates frames for `papsynth.generate` and returns the numbers of frames "written" and "present".
 #[pyfunction]
-#[pyo3(signature = (engine, out, frames, seed=0, *, shard=(0, 1), formats=None, frames_per_shard=None, scenes=false, threads=1, verify=false, progress=None))]
-#[expect(clippy::too_many_arguments, reason = "Python names them")]
+#[pyo3(signature = (engine, out, frames, seed=0, *, task=(0, 1), formats=None, frames_per_shard=None, scenes=false, threads=1, verify=false, progress=None))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
 pub(crate) fn generate<'py>(
     py: Python<'py>,
     engine: &Bound<'py, Engine>,
     out: PathBuf,
     frames: u64,
     seed: u64,
-    shard: (u64, u64),
+    task: (u64, u64),
     formats: Option<Vec<String>>,
     frames_per_shard: Option<u64>,
     scenes: bool,
@@ -38,13 +38,13 @@ pub(crate) fn generate<'py>(
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let made_by = engine.get();
-    let (index, of) = shard;
-    if of == 0 || index >= of {
-        return Err(wrong(format!("shard: ({index}, {of}) is none; expected (i, n) with i below n")));
+    let (index, count) = task;
+    if index >= count {
+        return Err(wrong(format!("task: ({index}, {count}) is out of range: expected (i, n) with i below n")));
     }
     for (name, number) in [("frames", frames), ("threads", threads as u64)] {
         if number == 0 {
-            return Err(wrong(format!("{name}: 0; expected 1 or more")));
+            return Err(wrong(format!("{name}: 0 is out of range: expected 1 or more")));
         }
     }
     let layout = Layout { scenes, ..layout(formats, frames_per_shard)? };
@@ -55,13 +55,20 @@ pub(crate) fn generate<'py>(
         map: made_by.map.as_ref(),
         layout: &layout,
     };
-    let dataset = py.detach(|| Home::at(&out).and_then(|home| Dataset::create_or_resume(&home, &info)));
+    let dataset = py.detach(|| Location::at(&out).and_then(|home| Dataset::create_or_resume(&home, &info)));
     let dataset = dataset.map_err(|error| error::dataset(&error))?;
     let stop = AtomicBool::new(false);
     let check = if verify { Check::Hashes } else { Check::Sizes };
-    let share = Share { index, of };
-    let run =
-        Run { frames: 0..frames, share, at_once: threads, threads: Threads::One, check, stop: &stop, profile: None };
+    let share = Task { index, total: of };
+    let run = Run {
+        frames: 0..frames,
+        task: share,
+        workers: threads,
+        threads: Threads::One,
+        check,
+        stop: &stop,
+        profile: None,
+    };
     let engine = &made_by.engine;
     let mut interrupted: Option<PyErr> = None;
     let progress = progress.map(Bound::unbind);
@@ -72,15 +79,15 @@ pub(crate) fn generate<'py>(
             let worker = scope.spawn(move || {
                 dataset.generate(engine, run, &|step| {
                     let done = match step {
-                        Progress::Kept(index) => index,
-                        Progress::Made(frame) => frame.index,
+                        Progress::Present(index) => index,
+                        Progress::Written(frame) => frame.index,
                     };
-                    // Nobody listens any more where Python has stopped.
+                    // The receiver is gone after an interrupt.
                     let _ = sender.send(done);
                 })
             });
             loop {
-                let found = receiver.recv_timeout(LOOK);
+                let found = receiver.recv_timeout(POLL);
                 let heard = Python::attach(|py| {
                     if let (Ok(index), Some(progress)) = (&found, &progress) {
                         progress.call1(py, (*index,))?;
@@ -102,11 +109,16 @@ pub(crate) fn generate<'py>(
     if let Some(error) = interrupted {
         return Err(error);
     }
-    let outcome = outcome.map_err(|_| wrong("the engine has failed"))?.map_err(|error| match error {
+    let outcome = outcome.map_err(|_| wrong("internal error: a worker thread panicked"))?.map_err(|error| match error {
         papsynth_dataset::Error::Engine(error) => error::engine(py, &made_by.source, &error),
         other => error::dataset(&other),
     })?;
-    [("kept", outcome.kept), ("made", outcome.made)].into_py_dict(py)
+    [("written", outcome.written), ("present", outcome.present)].into_py_dict(py)
+}
+
+/// Returns a count with its noun: "1 shard", "2 shards".
+fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
 fn layout(formats: Option<Vec<String>>, frames_per_shard: Option<u64>) -> PyResult<Layout> {
@@ -117,7 +129,7 @@ fn layout(formats: Option<Vec<String>>, frames_per_shard: Option<u64>) -> PyResu
     let mut layout = Layout::new(formats);
     if let Some(frames) = frames_per_shard {
         if !(1..=1_000_000).contains(&frames) {
-            return Err(wrong(format!("frames_per_shard: {frames}; expected 1 to 1000000")));
+            return Err(wrong(format!("frames_per_shard: {frames} is out of range: expected 1 to 1000000")));
         }
         layout.frames_per_shard = frames;
     }
@@ -127,56 +139,57 @@ fn layout(formats: Option<Vec<String>>, frames_per_shard: Option<u64>) -> PyResu
 fn format(name: &str) -> PyResult<Format> {
     Format::built().find(|format| format.name() == name).ok_or_else(|| {
         let known: Vec<&str> = Format::built().map(Format::name).collect();
-        wrong(format!("formats: `{name}` is not known; expected some of {}", known.join(", ")))
+        wrong(format!("formats: unknown format `{name}`; expected some of {}", known.join(", ")))
     })
 }
 
-/// Number of shards of a data set of so many frames.
+/// Returns the number of shards of a data set.
 #[pyfunction]
 #[pyo3(signature = (frames, formats=None, frames_per_shard=None))]
 pub(crate) fn shards(frames: u64, formats: Option<Vec<String>>, frames_per_shard: Option<u64>) -> PyResult<u64> {
     Ok(frames.div_ceil(layout(formats, frames_per_shard)?.frames_per_shard))
 }
 
-/// What `papsynth.merge` does: the root hash.
+/// Completes a data set and returns its root hash.
 #[pyfunction]
 pub(crate) fn merge(py: Python<'_>, out: PathBuf, frames: u64) -> PyResult<String> {
     let gaps = missing(py, out.clone(), frames)?;
     if !gaps.is_empty() {
         let some: Vec<String> = gaps.iter().take(20).map(u64::to_string).collect();
-        let message = format!("{}: {} shards are missing: {}", out.display(), gaps.len(), some.join(", "));
+        let message = format!("{}: {} missing: {}", out.display(), counted(gaps.len(), "shard"), some.join(", "));
         return Err(wrong(message));
     }
-    let summary = py.detach(|| Dataset::open(&Home::at(&out)?)?.finish()).map_err(|error| error::dataset(&error))?;
+    let summary =
+        py.detach(|| Dataset::open(&Location::at(&out)?)?.finish()).map_err(|error| error::dataset(&error))?;
     if summary.frames != frames {
-        let message = format!("frames: {frames}; expected {}, which are there", summary.frames);
+        let message = format!("frames: {frames}; the data set has {}", summary.frames);
         return Err(wrong(message));
     }
     Ok(summary.root)
 }
 
-/// Numbers of the shards that are not whole, from commit records: also while others work.
+/// Returns the numbers of the missing shards, from commit records.
 #[pyfunction]
 pub(crate) fn missing(py: Python<'_>, out: PathBuf, frames: u64) -> PyResult<Vec<u64>> {
-    if frames == 0 || frames > MOST_FRAMES {
-        return Err(wrong(format!("frames: {frames}; expected 1 to {MOST_FRAMES}")));
+    if frames == 0 || frames > MAX_FRAMES {
+        return Err(wrong(format!("frames: {frames} is out of range: expected 1 to {MAX_FRAMES}")));
     }
-    let found = py.detach(|| shards_to_make(&Dataset::open(&Home::at(&out)?)?, 0..frames, Check::Sizes));
+    let found = py.detach(|| missing_shards(&Dataset::open(&Location::at(&out)?)?, 0..frames, Check::Sizes));
     Ok(found.map_err(|error| error::dataset(&error))?.into_iter().flatten().collect())
 }
 
-/// What `papsynth.verify` gives, where it is described.
+/// Verifies a data set for `papsynth.verify`.
 #[pyfunction]
 #[pyo3(signature = (out, frames=None))]
 pub(crate) fn verify(py: Python<'_>, out: PathBuf, frames: Option<u64>) -> PyResult<Bound<'_, PyDict>> {
-    let verdict =
-        py.detach(|| Home::at(&out).and_then(|home| papsynth_dataset::verify(&home, frames.map(|frames| 0..frames))));
-    let verdict = verdict.map_err(|error| error::dataset(&error))?;
-    let told = PyDict::new(py);
-    told.set_item("root", verdict.root)?;
-    told.set_item("frames", verdict.frames)?;
-    told.set_item("files", verdict.files)?;
-    let findings = verdict.findings.into_iter().map(|finding| (finding.path, finding.message));
-    told.set_item("findings", PyList::new(py, findings.collect::<Vec<_>>())?)?;
-    Ok(told)
+    let report =
+        py.detach(|| Location::at(&out).and_then(|location| papsynth_dataset::verify(&location, frames.map(|frames| 0..frames))));
+    let report = report.map_err(|error| error::dataset(&error))?;
+    let result = PyDict::new(py);
+    result.set_item("root", report.root)?;
+    result.set_item("frames", report.frames)?;
+    result.set_item("files", report.files)?;
+    let findings = report.findings.into_iter().map(|finding| (finding.path, finding.message));
+    result.set_item("findings", PyList::new(py, findings.collect::<Vec<_>>())?)?;
+    Ok(result)
 }

@@ -1,4 +1,4 @@
-//! The techniques alone, on arrays.
+//! The techniques on arrays.
 
 use std::fmt::Display;
 
@@ -7,44 +7,44 @@ use pyo3::prelude::*;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 
-use crate::array::{Given, nth, pixels, pixels_within, points};
+use crate::array::{ArrayLike, nth, pixels, pixels_within, points};
 use crate::error::wrong;
 
-/// Most pixels of an image that is made here.
-const MOST_PIXELS: usize = 1 << 30;
+/// Maximum number of pixels of a result.
+const MAX_PIXELS: usize = 1 << 30;
 
-const MOST_POINTS: usize = 1 << 20;
+const MAX_POINTS: usize = 1 << 20;
 
-/// Most points of an outline that a cell is made of.
-const MOST_OUTLINE: usize = 1 << 16;
+/// Maximum number of points of an outline.
+const MAX_OUTLINE: usize = 1 << 16;
 
-/// Absorbance and light have no other end.
+/// Range of absorbance and of light.
 const NOT_NEGATIVE: [f32; 2] = [0.0, f32::MAX];
 
 fn random(seed: u64) -> Xoshiro256PlusPlus {
     Xoshiro256PlusPlus::seed_from_u64(seed)
 }
 
-/// An image of so many rows and columns, which is drawn on zeros.
+/// Draws an image of the given shape, initialised with zeros.
 fn drawn<'py, E: Display + Send>(
     py: Python<'py>,
     (rows, columns): (usize, usize),
     draw: impl FnOnce(&mut [f32]) -> Result<(), E> + Send,
 ) -> PyResult<Bound<'py, PyAny>> {
     let mut out = match rows.checked_mul(columns) {
-        Some(pixels @ 1..=MOST_PIXELS) => vec![0.0; pixels],
-        _ => return Err(wrong(format!("shape: ({rows}, {columns}); expected 1 to {MOST_PIXELS} pixels"))),
+        Some(pixels @ 1..=MAX_PIXELS) => vec![0.0; pixels],
+        _ => return Err(wrong(format!("shape: ({rows}, {columns}) is out of range: expected 1 to {MAX_PIXELS} pixels"))),
     };
     py.detach(|| draw(&mut out)).map_err(wrong)?;
     image(py, out, columns)
 }
 
-/// An outline of as many points as can be worked with.
-fn outline_of(given: &Given<'_>) -> PyResult<Vec<[f64; 2]>> {
+/// Returns an outline of 3 to `MAX_OUTLINE` points.
+fn outline_of(given: &ArrayLike<'_>) -> PyResult<Vec<[f64; 2]>> {
     let outline = points("outline", given)?;
     match outline.len() {
-        3..=MOST_OUTLINE => Ok(outline),
-        found => Err(wrong(format!("outline: {found} points; expected 3 to {MOST_OUTLINE}"))),
+        3..=MAX_OUTLINE => Ok(outline),
+        found => Err(wrong(format!("outline: expected 3 to {MAX_OUTLINE} points, found {found}"))),
     }
 }
 
@@ -58,7 +58,7 @@ fn outline<'py>(py: Python<'py>, points: Vec<[f64; 2]>) -> PyResult<Bound<'py, P
     Ok(points.into_iter().flatten().collect::<Vec<_>>().into_pyarray(py).reshape([rows, 2])?.into_any())
 }
 
-/// The modules of Python, and what each holds.
+/// Declares the Python modules and their items.
 macro_rules! modules {
     ($($(#[$($about:tt)*])* $module:ident { $($item:ident),* })*) => {$(
         $(#[$($about)*])*
@@ -71,52 +71,52 @@ macro_rules! modules {
 }
 
 modules! {
-    /// Outlines as Fourier shape descriptors.
+    /// Fourier shape descriptors of outlines.
     fsd { ShapeModel, trace }
-    /// Cells as cloth that is pressed into their outline.
+    /// Cloth simulation of cytoplasm.
     cloth { crumple }
-    /// Cytoskeletons.
+    /// Cytoskeletons on Voronoi diagrams.
     cytoskeleton { grow }
-    /// Random fields and noise of backgrounds.
+    /// Random fields and Perlin noise.
     fields { matern, perlin }
-    /// Textures from pieces of others.
+    /// Patch-based texture synthesis.
     texture { quilt }
-    /// How a microscope spreads light.
+    /// Microscope optics.
     optics { bright_field, gaussian, gibson_lanni }
-    /// Noise of a camera: what it makes of light.
+    /// Camera model of EMVA 1288.
     noise { expose }
-    /// The colours of dyes.
+    /// Colours of dyes.
     dyes { transmittance }
 }
 
-/// The outline of the one object of a mask, through the places where it has a level.
+/// Return the outline of the single object of a mask as the contour at a level.
 ///
 /// Parameters
 /// ----------
 /// mask : array_like
 ///     (height, width), coverage 0 to 1.
 /// level : float
-///     Above 0.
+///     Contour level, above 0.
 ///
 /// Returns
 /// -------
 /// ndarray
-///     (points, 2), float64: x and y in pixels, 0 at the middle of the first pixel.
+///     (points, 2), float64: x and y in pixels, 0 at the centre of the first pixel.
 #[pyfunction]
 #[pyo3(signature = (mask, level=0.5))]
-fn trace<'py>(py: Python<'py>, mask: Given<'py>, level: f32) -> PyResult<Bound<'py, PyAny>> {
+fn trace<'py>(py: Python<'py>, mask: ArrayLike<'py>, level: f32) -> PyResult<Bound<'py, PyAny>> {
     let (mask, width) = pixels_within("mask", &mask, [0.0, 1.0])?;
     outline(py, fsd_shape::trace(&mask, width, level).map_err(wrong)?)
 }
 
-/// How outlines vary: learned from some, it draws others.
+/// A statistical model of outlines, fitted to samples.
 ///
 /// Parameters
 /// ----------
 /// outlines : list of array_like
 ///     Three or more, each (points, 2).
 /// harmonics : int
-///     Highest number of a descriptor that is kept.
+///     Highest harmonic of the descriptors.
 #[pyclass(frozen, module = "papsynth.fsd")]
 struct ShapeModel(fsd_shape::ShapeModel);
 
@@ -124,7 +124,7 @@ struct ShapeModel(fsd_shape::ShapeModel);
 impl ShapeModel {
     #[new]
     #[pyo3(signature = (outlines, harmonics=40))]
-    fn new(py: Python<'_>, outlines: Vec<Given<'_>>, harmonics: usize) -> PyResult<Self> {
+    fn new(py: Python<'_>, outlines: Vec<ArrayLike<'_>>, harmonics: usize) -> PyResult<Self> {
         let outlines: Vec<Vec<[f64; 2]>> = outlines
             .iter()
             .enumerate()
@@ -134,12 +134,12 @@ impl ShapeModel {
         py.detach(|| fsd_shape::ShapeModel::fit(&outlines, &params)).map(Self).map_err(wrong)
     }
 
-    /// A new outline.
+    /// Draw a new outline.
     ///
     /// Parameters
     /// ----------
     /// radius_px : float, optional
-    ///     Size of its first descriptor; by default as those that were learned.
+    ///     Magnitude of the first descriptor. Default: drawn from the samples.
     /// seed : int
     /// points : int
     ///     3 to 1048576.
@@ -147,7 +147,7 @@ impl ShapeModel {
     /// Returns
     /// -------
     /// ndarray
-    ///     (points, 2), about the origin.
+    ///     (points, 2), centred on the origin.
     #[pyo3(signature = (radius_px=None, seed=0, points=400))]
     fn draw<'py>(
         &self,
@@ -156,8 +156,8 @@ impl ShapeModel {
         seed: u64,
         points: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
-        if !(3..=MOST_POINTS).contains(&points) {
-            return Err(wrong(format!("points: {points}; expected 3 to {MOST_POINTS}")));
+        if !(3..=MAX_POINTS).contains(&points) {
+            return Err(wrong(format!("points: {points} is out of range: expected 3 to {MAX_POINTS}")));
         }
         let mut random = random(seed);
         let radius_px = radius_px.unwrap_or_else(|| self.0.draw_radius(&mut random));
@@ -165,7 +165,7 @@ impl ShapeModel {
     }
 }
 
-/// The thickness of a sheet that is pressed into an outline.
+/// Return the thickness of a cloth sheet that is pressed into an outline.
 ///
 /// Parameters
 /// ----------
@@ -175,19 +175,19 @@ impl ShapeModel {
 ///     Rows and columns of the image.
 /// seed : int
 /// vertices : int
-///     Of the mesh, 32 to 65536.
+///     Number of vertices of the mesh, 32 to 65536.
 /// excess : float
-///     Area of the flat sheet over that of the outline, 1 to 4.
+///     Area of the flat sheet relative to that of the outline, 1 to 4.
 ///
 /// Returns
 /// -------
 /// ndarray
-///     (rows, columns), float32: number of layers over each pixel.
+///     (rows, columns), float32: mean number of layers at each pixel.
 #[pyfunction]
 #[pyo3(signature = (outline, shape, seed=0, *, vertices=1200, excess=1.15))]
 fn crumple<'py>(
     py: Python<'py>,
-    outline: Given<'py>,
+    outline: ArrayLike<'py>,
     shape: (usize, usize),
     seed: u64,
     vertices: usize,
@@ -203,7 +203,7 @@ fn crumple<'py>(
     })
 }
 
-/// A cytoskeleton within an outline, drawn.
+/// Draw a cytoskeleton within an outline.
 ///
 /// Parameters
 /// ----------
@@ -215,7 +215,7 @@ fn crumple<'py>(
 /// rivers : int
 ///     Number of trees.
 /// width_px : float
-///     Width of their lines at the mouth.
+///     Width of the lines at the root of a tree, pixels.
 ///
 /// Returns
 /// -------
@@ -225,7 +225,7 @@ fn crumple<'py>(
 #[pyo3(signature = (outline, shape, seed=0, *, rivers=15, width_px=1.7))]
 fn grow<'py>(
     py: Python<'py>,
-    outline: Given<'py>,
+    outline: ArrayLike<'py>,
     shape: (usize, usize),
     seed: u64,
     rivers: usize,
@@ -240,23 +240,24 @@ fn grow<'py>(
     })
 }
 
-/// Perlin's noise, in several octaves.
+/// Return fractal Perlin noise.
 ///
 /// Parameters
 /// ----------
 /// shape : tuple of int
 ///     Rows and columns.
 /// cell_px : float
-///     Size of its coarsest cells.
+///     Size of the coarsest lattice cells, pixels.
 /// seed : int
 /// octaves : int
+///     Number of octaves.
 /// persistence : float
-///     Height of an octave over that of the one before.
+///     Amplitude of an octave relative to the one before.
 ///
 /// Returns
 /// -------
 /// ndarray
-///     (rows, columns), float32, about -1 to 1.
+///     (rows, columns), float32, approximately -1 to 1.
 #[pyfunction]
 #[pyo3(signature = (shape, cell_px=64.0, seed=0, *, octaves=4, persistence=0.5))]
 fn perlin(
@@ -268,7 +269,7 @@ fn perlin(
     persistence: f64,
 ) -> PyResult<Bound<'_, PyAny>> {
     if !(cell_px.is_finite() && cell_px > 0.0) {
-        return Err(wrong(format!("cell_px: {cell_px}; expected a number above 0")));
+        return Err(wrong(format!("cell_px: {cell_px} is out of range: expected a number above 0")));
     }
     drawn(py, shape, |out| -> Result<(), perlin_bg::Error> {
         let params = perlin_bg::FractalParams { octaves, persistence, ..Default::default() };
@@ -278,13 +279,14 @@ fn perlin(
     })
 }
 
-/// A Gaussian random field of Matern's covariance.
+/// Return a Gaussian random field with Matérn covariance.
 ///
 /// Parameters
 /// ----------
 /// shape : tuple of int
 ///     Rows and columns.
 /// length_px : float
+///     Correlation length, pixels.
 /// nu : float
 ///     Smoothness.
 /// seed : int
@@ -292,7 +294,7 @@ fn perlin(
 /// Returns
 /// -------
 /// ndarray
-///     (rows, columns), float32, of mean 0 and variance 1.
+///     (rows, columns), float32, with mean 0 and variance 1.
 #[pyfunction]
 #[pyo3(signature = (shape, length_px=4.0, nu=1.0, seed=0))]
 fn matern(py: Python<'_>, shape: (usize, usize), length_px: f64, nu: f64, seed: u64) -> PyResult<Bound<'_, PyAny>> {
@@ -308,19 +310,19 @@ fn matern(py: Python<'_>, shape: (usize, usize), length_px: f64, nu: f64, seed: 
     })
 }
 
-/// Covers a target with pieces of a texture.
+/// Synthesise a texture from patches of a source.
 ///
 /// Parameters
 /// ----------
 /// source : array_like
 ///     (rows, columns), the texture.
 /// mask : array_like
-///     The same shape: 1 where it may be taken from, else 0.
+///     The same shape: 1 where the texture may be used, else 0.
 /// target : array_like
-///     (rows, columns) of the result: 1 where it is wanted, else 0.
+///     (rows, columns) of the result: 1 where texture is needed, else 0.
 /// seed : int
 /// patch_px, overlap_px : int
-///     Sides of pieces, and how far they lie over each other.
+///     Size and overlap of the patches, pixels.
 ///
 /// Returns
 /// -------
@@ -330,9 +332,9 @@ fn matern(py: Python<'_>, shape: (usize, usize), length_px: f64, nu: f64, seed: 
 #[pyo3(signature = (source, mask, target, seed=0, *, patch_px=9, overlap_px=3))]
 fn quilt<'py>(
     py: Python<'py>,
-    source: Given<'py>,
-    mask: Given<'py>,
-    target: Given<'py>,
+    source: ArrayLike<'py>,
+    mask: ArrayLike<'py>,
+    target: ArrayLike<'py>,
     seed: u64,
     patch_px: usize,
     overlap_px: usize,
@@ -342,7 +344,7 @@ fn quilt<'py>(
     let (target, target_width) = pixels_within("target", &target, [0.0, 1.0])?;
     if (mask.len(), mask_width) != (texture.len(), width) {
         let [found, wanted] = [(&mask, mask_width), (&texture, width)].map(|(v, w)| (v.len() / w, w));
-        return Err(wrong(format!("mask: has the shape {found:?}; expected that of source, {wanted:?}")));
+        return Err(wrong(format!("mask: expected the shape of source, {wanted:?}, found {found:?}")));
     }
     let made = py.detach(|| {
         let source = quilt_texture::Source::new(&texture, &mask, width)?;
@@ -354,54 +356,54 @@ fn quilt<'py>(
     image(py, made.map_err(|error: quilt_texture::Error| wrong(error))?, target_width)
 }
 
-/// A Gaussian blur, mirrored at the border.
+/// Apply a Gaussian blur with mirrored borders.
 ///
 /// Parameters
 /// ----------
 /// image : array_like
 ///     (rows, columns).
 /// sigma_px : float
-///     0 to 4096.
+///     Standard deviation, 0 to 4096 pixels.
 ///
 /// Returns
 /// -------
 /// ndarray
 ///     As `image`, float32.
 #[pyfunction]
-fn gaussian<'py>(py: Python<'py>, image: Given<'py>, sigma_px: f64) -> PyResult<Bound<'py, PyAny>> {
+fn gaussian<'py>(py: Python<'py>, image: ArrayLike<'py>, sigma_px: f64) -> PyResult<Bound<'py, PyAny>> {
     let (values, width) = pixels("image", &image)?;
     let gaussian = optics_psf::Gaussian::new(sigma_px).map_err(wrong)?;
     let blurred = py.detach(|| gaussian.blur(&values, width, optics_psf::Border::Reflect));
     self::image(py, blurred, width)
 }
 
-/// The light that a thin layer of absorbance lets through, as a partially coherent microscope shows it.
+/// Return the partially coherent bright-field image of a thin absorbing layer.
 ///
 /// Parameters
 /// ----------
 /// absorbance : array_like
-///     (rows, columns), decadic, two samples a pixel.
+///     (rows, columns), decadic absorbance, two samples per pixel.
 /// defocus_um : float
-///     Depth about the plane in focus, positive towards the objective.
+///     Depth relative to the plane in focus, µm; positive towards the objective.
 /// na, condenser_na : float
-///     Numerical apertures.
+///     Numerical apertures of objective and condenser.
 ///
 /// Returns
 /// -------
 /// ndarray
-///     (rows / 2, columns / 2), float32: light relative to the empty slide.
+///     (rows / 2, columns / 2), float32: transmittance relative to the empty slide.
 #[pyfunction]
 #[pyo3(signature = (absorbance, defocus_um=0.0, *, na=0.95, condenser_na=0.41))]
 fn bright_field<'py>(
     py: Python<'py>,
-    absorbance: Given<'py>,
+    absorbance: ArrayLike<'py>,
     defocus_um: f64,
     na: f64,
     condenser_na: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (values, width) = pixels_within("absorbance", &absorbance, NOT_NEGATIVE)?;
     if !defocus_um.is_finite() {
-        return Err(wrong(format!("defocus_um: {defocus_um}; expected a finite number")));
+        return Err(wrong(format!("defocus_um: {defocus_um} is out of range: expected a finite number")));
     }
     let height = values.len() / width;
     let made = py.detach(|| {
@@ -418,13 +420,14 @@ fn bright_field<'py>(
     self::image(py, light, columns)
 }
 
-/// The point spread function of Gibson and Lanni, of a point below a cover glass.
+/// Return the Gibson–Lanni point spread function of a point below a cover glass.
 ///
 /// Parameters
 /// ----------
 /// r_um, z_um : array_like
-///     Distances from the axis, and of the stage.
-/// na, wavelength_um, depth_um : float
+///     Distances from the axis and stage positions, µm.
+/// na, wavelength_um, depth_um : float, optional
+///     Numerical aperture, wavelength and depth of the point, µm.
 ///
 /// Returns
 /// -------
@@ -440,18 +443,18 @@ fn gibson_lanni(
     wavelength_um: Option<f64>,
     depth_um: Option<f64>,
 ) -> PyResult<Bound<'_, PyAny>> {
-    let usual = optics_psf::GibsonLanniParams::default();
+    let default = optics_psf::GibsonLanniParams::default();
     let params = optics_psf::GibsonLanniParams {
-        na: na.unwrap_or(usual.na),
-        wavelength_um: wavelength_um.unwrap_or(usual.wavelength_um),
-        depth_um: depth_um.unwrap_or(usual.depth_um),
-        ..usual
+        na: na.unwrap_or(default.na),
+        wavelength_um: wavelength_um.unwrap_or(default.wavelength_um),
+        depth_um: depth_um.unwrap_or(default.depth_um),
+        ..default
     };
     let made = py.detach(|| optics_psf::GibsonLanni::new(&params)?.profile(&r_um, &z_um));
     image(py, made.map_err(wrong)?, r_um.len())
 }
 
-/// A frame of a camera, with shot noise, read noise and everything else of it.
+/// Simulate a camera frame with shot noise, read noise and fixed pattern.
 ///
 /// Parameters
 /// ----------
@@ -467,14 +470,14 @@ fn gibson_lanni(
 ///     As `electrons`, uint16 grey levels.
 #[pyfunction]
 #[pyo3(signature = (electrons, seed=0, *, camera="orca-05g"))]
-fn expose<'py>(py: Python<'py>, electrons: Given<'py>, seed: u64, camera: &str) -> PyResult<Bound<'py, PyAny>> {
+fn expose<'py>(py: Python<'py>, electrons: ArrayLike<'py>, seed: u64, camera: &str) -> PyResult<Bound<'py, PyAny>> {
     let (electrons, width) = pixels_within("electrons", &electrons, NOT_NEGATIVE)?;
     let params = match camera {
         "paper" => ccd_noise::CameraParams::paper(),
         "orca-05g" => ccd_noise::CameraParams::orca_05g(),
         "scmos" => ccd_noise::CameraParams::scmos(),
         other => {
-            let message = format!("camera: `{other}` is not known; expected paper, orca-05g or scmos");
+            let message = format!("camera: unknown camera `{other}`; expected paper, orca-05g or scmos");
             return Err(wrong(message));
         }
     };
@@ -484,12 +487,12 @@ fn expose<'py>(py: Python<'py>, electrons: Given<'py>, seed: u64, camera: &str) 
     image(py, frame, width)
 }
 
-/// The light that a mixture of dyes lets through, in the channels of a colour camera.
+/// Return the transmittance of a mixture of dyes in the channels of a colour camera.
 ///
 /// Parameters
 /// ----------
 /// haematein, eosin_y, light_green, orange_g : array_like, optional
-///     (rows, columns), decadic absorbance of each dye at its own peak; at least one, all of one shape.
+///     (rows, columns), decadic absorbance of each dye at its peak; at least one, all of equal shape.
 ///
 /// Returns
 /// -------
@@ -499,13 +502,13 @@ fn expose<'py>(py: Python<'py>, electrons: Given<'py>, seed: u64, camera: &str) 
 #[pyo3(signature = (*, haematein=None, eosin_y=None, light_green=None, orange_g=None))]
 fn transmittance<'py>(
     py: Python<'py>,
-    haematein: Option<Given<'py>>,
-    eosin_y: Option<Given<'py>>,
-    light_green: Option<Given<'py>>,
-    orange_g: Option<Given<'py>>,
+    haematein: Option<ArrayLike<'py>>,
+    eosin_y: Option<ArrayLike<'py>>,
+    light_green: Option<ArrayLike<'py>>,
+    orange_g: Option<ArrayLike<'py>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     use dye_spectra::{Colour, ColourParams, DYES};
-    // In the order of `Dye::ALL`, without the last of them, which is neutral.
+    // In the order of `Dye::ALL`, without the last one, which is neutral.
     let given = [("haematein", haematein), ("eosin_y", eosin_y), ("light_green", light_green), ("orange_g", orange_g)];
     let mut planes: [Vec<f32>; DYES] = Default::default();
     let mut shape: Option<[usize; 2]> = None;
@@ -514,13 +517,13 @@ fn transmittance<'py>(
         let (values, width) = pixels_within(name, &plane, NOT_NEGATIVE)?;
         let own = [values.len() / width, width];
         if shape.is_some_and(|shape| shape != own) {
-            return Err(wrong(format!("{name}: {own:?} is another shape than that of the others")));
+            return Err(wrong(format!("{name}: the shape {own:?} differs from that of the other dyes")));
         }
         shape = Some(own);
         *place = values;
     }
     let Some([rows, width]) = shape else {
-        return Err(wrong("at least one dye is needed"));
+        return Err(wrong("expected at least one dye"));
     };
     let colour = Colour::new(&ColourParams::default()).map_err(wrong)?;
     let light = py.detach(|| {

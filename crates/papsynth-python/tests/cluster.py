@@ -1,4 +1,4 @@
-"""Data sets made by engines whose workers and drivers are killed: the same root hash as one process.
+"""Ray and Dask with killed workers and drivers: the root hash must equal that of one process.
 
 Usage: python cluster.py ray|dask FOLDER
 
@@ -16,7 +16,7 @@ from pathlib import Path
 import papsynth
 
 RECIPE = {"field": {"width_px": 320, "height_px": 240}}
-FRAMES, SEED, PARTS = 60, 7, 20
+FRAMES, SEED, TASKS = 60, 7, 20
 WORDS = {"formats": ["folder", "webdataset"], "frames_per_shard": 1}
 
 
@@ -27,15 +27,15 @@ def check(holds, claim):
 
 
 def dying(deaths, after):
-    """What a part is made by, where the first so many die: before their end, or after it and before anybody hears of it."""
+    """Return a task function whose first `deaths` calls kill their worker, before the end or after the write."""
     usual = papsynth._sets.generate
 
-    def part_of(recipe, out, frames, seed, shard, options):
+    def task_of(recipe, out, frames, seed, task, options):
         marks = Path(out).parent / "deaths"
         marks.mkdir(exist_ok=True)
 
         def die(*_):
-            # Whoever makes the file dies.
+            # The process that creates the file kills itself.
             for number in range(deaths):
                 try:
                     (marks / str(number)).touch(exist_ok=False)
@@ -43,20 +43,20 @@ def dying(deaths, after):
                     continue
                 os.kill(os.getpid(), signal.SIGKILL)
 
-        usual(recipe, out, frames, seed, shard=shard, progress=None if after else die, **options)
+        usual(recipe, out, frames, seed, task=task, progress=None if after else die, **options)
         if after:
             die()
 
-    return part_of
+    return task_of
 
 
 def deaths_in(folder):
     return len(list((folder / "deaths").iterdir()))
 
 
-def is_progress(told):
-    whole = [count for count, _ in told]
-    return len(whole) > 2 and whole == sorted(set(whole)) and whole[-1] == FRAMES and {of for _, of in told} == {FRAMES}
+def is_progress(reports):
+    whole = [count for count, _ in reports]
+    return len(whole) > 2 and whole == sorted(set(whole)) and whole[-1] == FRAMES and {total for _, total in reports} == {FRAMES}
 
 
 def with_ray(folder, expected):
@@ -64,15 +64,15 @@ def with_ray(folder, expected):
 
     import papsynth.ray
 
-    # Workers have their packages from here, and their tasks by value.
+    # Workers import packages from here and receive tasks by value.
     ray.init(num_cpus=2, include_dashboard=False, logging_level="error")
-    papsynth.ray._part = dying(12, after=False)
+    papsynth.ray._task = dying(12, after=False)
     told = []
     root = papsynth.ray.generate(
-        RECIPE, folder / "set", FRAMES, SEED, shards=PARTS, progress=lambda *counts: told.append(counts), **WORDS
+        RECIPE, folder / "set", FRAMES, SEED, tasks=TASKS, progress=lambda *counts: told.append(counts), **WORDS
     )
     check(deaths_in(folder) == 12 and root == expected, f"Ray: the same root hash with 12 workers killed: {root}")
-    check(is_progress(told), "Ray: progress is told from commit records")
+    check(is_progress(told), "Ray: progress is reported from commit records")
     samples = list(papsynth.ray.dataset(RECIPE, SEED, 5, transform=lambda frame: frame.image))
     same = all((papsynth.render(RECIPE, SEED, index).image == image).all() for index, image in enumerate(samples))
     check(same and len(samples) == 5, "Ray: samples come in the order of their indices")
@@ -85,18 +85,18 @@ def with_dask(folder, expected):
 
     import papsynth.dask
 
-    # None is given up for having killed several workers: that is the point here.
+    # Allow tasks to kill several workers.
     import dask
 
     dask.config.set({"distributed.scheduler.allowed-failures": 20})
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
-        papsynth.dask._part = dying(8, after=True)
+        papsynth.dask._task = dying(8, after=True)
         told = []
         root = papsynth.dask.generate(
-            RECIPE, folder / "set", FRAMES, SEED, client=client, shards=PARTS, progress=lambda *counts: told.append(counts), **WORDS
+            RECIPE, folder / "set", FRAMES, SEED, client=client, tasks=TASKS, progress=lambda *counts: told.append(counts), **WORDS
         )
     check(deaths_in(folder) == 8 and root == expected, f"Dask: the same root hash with 8 workers killed after the write: {root}")
-    check(is_progress(told), "Dask: progress is told from commit records")
+    check(is_progress(told), "Dask: progress is reported from commit records")
     killed_driver("dask", folder, expected)
 
 
@@ -105,18 +105,18 @@ def killed_driver(engine, folder, expected):
     script = f"""
 import papsynth.{engine} as engine
 if __name__ == "__main__":
-    print(engine.generate({RECIPE!r}, {str(out)!r}, {FRAMES}, {SEED}, shards={PARTS}, **{WORDS!r}))
+    print(engine.generate({RECIPE!r}, {str(out)!r}, {FRAMES}, {SEED}, shards={TASKS}, **{WORDS!r}))
 """
     (folder / "driver.py").write_text(script)
     words = [sys.executable, str(folder / "driver.py")]
     driver = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, start_new_session=True)
     while driver.poll() is None and len(list(out.glob("shards/*.json"))) < FRAMES // 4:
         time.sleep(0.05)
-    check(driver.poll() is None, f"{engine}: the driver is killed in the middle of its work")
+    check(driver.poll() is None, f"{engine}: the driver is killed during the run")
     os.killpg(driver.pid, signal.SIGKILL)
     driver.wait()
     told = subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip().splitlines()[-1]
-    check(told == expected, f"{engine}: the same root hash with the driver killed and started anew")
+    check(told == expected, f"{engine}: the same root hash with the driver killed and restarted")
 
 
 def main(engine, folder):

@@ -1,4 +1,4 @@
-"""A real Slurm on this machine runs an array whose tasks are requeued and whose daemon is killed: the same root hash as one process.
+"""Runs a job array on a local Slurm with requeued tasks and a killed daemon: the root hash must equal that of one process.
 
 Usage: python cluster_slurm.py PAPSYNTH FOLDER ROOT
 
@@ -37,7 +37,7 @@ def free_port():
 
 
 class Slurm:
-    """munged, slurmctld and slurmd of this test alone."""
+    """The daemons munged, slurmctld and slurmd of this test."""
 
     def __init__(self, folder):
         self.folder = folder
@@ -130,7 +130,7 @@ def main(program, folder, root):
     words = [program, "submit", "slurm", "--tasks", str(TASKS), "--threads", "1", "--", "--out", str(out), "--quiet", *own_words]
     text = subprocess.run(words, capture_output=True, text=True, check=True).stdout
     script.write_text(text.replace("papsynth generate", f"{program} generate", 1))
-    # The sockets of munge must lie where nobody else may write.
+    # munge requires a socket folder that only its owner can write.
     own = Path(tempfile.mkdtemp(prefix="papsynth-slurm-"))
     own.chmod(0o755)
     slurm = None
@@ -151,7 +151,7 @@ def main(program, folder, root):
                 killed += 1
                 time.sleep(1)
                 slurm.start("slurmd", ["slurmd", "-D", "-N", slurm.host])
-            # What a person does for tasks whose launch failed, and for a node that is down.
+            # Releases tasks whose launch failed, and resumes the node.
             for state in states:
                 if "held" in state:
                     slurm.run("scontrol", "release", state.split()[0], check=False)
@@ -164,7 +164,7 @@ def main(program, folder, root):
             slurm.end()
         shutil.rmtree(own, ignore_errors=True)
     left = subprocess.run([program, "status", out, "--frames", str(FRAMES), "--missing"], capture_output=True, text=True, check=True)
-    check(left.stdout.strip() == "", f"Slurm: no shard is missing {left.stdout.strip()}")
+    check(left.stdout.strip() == "", f"Slurm: missing shards: {left.stdout.strip()}")
     subprocess.run([program, "merge", out, "--frames", str(FRAMES)], check=True, stdout=subprocess.DEVNULL)
     told = subprocess.run([program, "verify", out, "--frames", str(FRAMES)], capture_output=True, text=True, check=True).stdout
     check(root in told, f"Slurm: the same root hash {root}")

@@ -1,4 +1,4 @@
-"""Data sets in an object store that fails now and then, made by programs that are killed: the same files as in a folder.
+"""Data sets in an unreliable object store, written by killed processes: the files must equal those in a folder.
 
 Usage: python cluster_store.py PROGRAM FOLDER
 
@@ -28,7 +28,7 @@ RECIPE = {"field": {"width_px": 320, "height_px": 240}}
 FRAMES, SEED = 60, 7
 WORDS = {"formats": ["folder", "webdataset"], "frames_per_shard": 1}
 BUCKET = "cells"
-# Words of a program that is built with more features than the package.
+# Options for a binary with more features than the package.
 OWN: list[str] = []
 
 
@@ -38,8 +38,8 @@ def check(holds, claim):
     print(f"ok: {claim}", flush=True)
 
 
-class Faulty(http.server.BaseHTTPRequestHandler):
-    """Passes requests on. Every 37th is refused, of every 53rd the answer is lost after all was done."""
+class UnreliableProxy(http.server.BaseHTTPRequestHandler):
+    """Forwards requests. Rejects every 37th, and drops the reply of every 53rd after forwarding it."""
 
     protocol_version = "HTTP/1.1"
     counter = itertools.count(1)
@@ -53,7 +53,7 @@ class Faulty(http.server.BaseHTTPRequestHandler):
         number = next(self.counter)
         body = self.rfile.read(int(self.headers.get("content-length") or 0))
         if number % 37 == 0:
-            Faulty.refused += 1
+            UnreliableProxy.refused += 1
             self.send_response(503)
             self.send_header("content-length", "0")
             self.end_headers()
@@ -63,7 +63,7 @@ class Faulty(http.server.BaseHTTPRequestHandler):
         answer = there.getresponse()
         content = answer.read()
         if number % 53 == 0:
-            Faulty.lost += 1
+            UnreliableProxy.lost += 1
             self.close_connection = True
             return
         self.send_response(answer.status)
@@ -82,11 +82,11 @@ class Between(http.server.ThreadingHTTPServer):
     daemon_threads = True
 
     def handle_error(self, *_):
-        """Programs that are killed hang up."""
+        """Ignores connections closed by killed processes."""
 
 
 def run(program, *words, kill_after=None):
-    """Runs the program, or kills it; its exit code and what it said."""
+    """Run the program, optionally kill it, and return its exit code and output."""
     process = subprocess.Popen([program, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         out, err = process.communicate(timeout=kill_after)
@@ -117,8 +117,8 @@ def main(program, folder):
 
     server = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
     server.start()
-    Faulty.store = server.get_host_and_port()
-    between = Between(("127.0.0.1", 0), Faulty)
+    UnreliableProxy.store = server.get_host_and_port()
+    between = Between(("127.0.0.1", 0), UnreliableProxy)
     threading.Thread(target=between.serve_forever, daemon=True).start()
     os.environ.update(
         AWS_ACCESS_KEY_ID="papsynth",
@@ -128,7 +128,7 @@ def main(program, folder):
         AWS_ALLOW_HTTP="true",
         TMPDIR=str(temporary),
     )
-    host, port = Faulty.store
+    host, port = UnreliableProxy.store
     store = boto3.client("s3", endpoint_url=f"http://{host}:{port}", region_name="us-east-1")
     store.create_bucket(Bucket=BUCKET)
 
@@ -141,30 +141,30 @@ def main(program, folder):
     deaths = 0
     for share in ("0/2", "1/2"):
         for seconds in (0.6, 0.9, 1.3, 1.1, 0.7, 1.6):
-            code, _ = run(program, *generating(out, "--shard", share), kill_after=seconds)
+            code, _ = run(program, *generating(out, "--task", share), kill_after=seconds)
             deaths += code is None
-        code, told = run(program, *generating(out, "--shard", share))
+        code, told = run(program, *generating(out, "--task", share))
         check(code == 0, f"share {share} is completed {told if code else ''}")
     check(deaths >= 8, f"the program was killed {deaths} times")
     code, told = run(program, "status", out, "--frames", str(FRAMES))
-    check(code == 0 and f"{FRAMES} of {FRAMES} shards" in told, "status knows that all is there")
+    check(code == 0 and f"{FRAMES} of {FRAMES} shards" in told, "status reports a complete data set")
     check(run(program, "merge", out, "--frames", str(FRAMES))[0] == 0, "merge closes it")
     code, told = run(program, "verify", out, "--frames", str(FRAMES))
     check(code == 0 and expected in told, f"object store: the same root hash with the program killed: {expected}")
     check(objects("killed") == files, f"its {len(files)} objects are the files of a folder")
-    check(Faulty.refused > 10 and Faulty.lost > 10, f"{Faulty.refused} requests were refused, {Faulty.lost} answers lost")
+    check(UnreliableProxy.refused > 10 and UnreliableProxy.lost > 10, f"{UnreliableProxy.refused} requests were rejected, {UnreliableProxy.lost} replies lost")
 
     out = f"s3://{BUCKET}/some/where"
-    papsynth.generate(RECIPE, out, FRAMES, SEED, shard=(1, 2), **WORDS)
+    papsynth.generate(RECIPE, out, FRAMES, SEED, task=(1, 2), **WORDS)
     check(papsynth.missing(out, FRAMES) == list(range(0, FRAMES, 2)), "Python knows what is missing in a store")
-    papsynth.generate(RECIPE, out, FRAMES, SEED, shard=(0, 2), **WORDS)
+    papsynth.generate(RECIPE, out, FRAMES, SEED, task=(0, 2), **WORDS)
     check(papsynth.merge(out, FRAMES) == expected, "Python: the same root hash in an object store")
 
     lost = "killed/images/000007.png" if "images/000007.png" in files else f"killed/{sorted(name for name in files if '000007' in name)[0]}"
     store.delete_object(Bucket=BUCKET, Key=lost)
     store.put_object(Bucket=BUCKET, Key="killed/notes.txt", Body=b"mine")
     code, told = run(program, "verify", f"s3://{BUCKET}/killed")
-    check(code == 2 and "is missing" in told and "notes.txt" in told, "verify finds a lost object and a stray one")
+    check(code == 2 and ": missing" in told and "notes.txt" in told, "verify finds a lost object and a stray one")
     check(run(program, *generating(f"s3://{BUCKET}/killed"))[0] == 0, "the same command makes what is lost")
     code, told = run(program, "clean", f"s3://{BUCKET}/killed", "--strays")
     check(code == 0 and objects("killed") == files, "clean takes the stray one away")

@@ -1,4 +1,4 @@
-"""The scripts of the documentation run, and show what they claim. PAPSYNTH_REFERENCE is the folder of real fields, where there is one."""
+"""Tests of the example scripts. PAPSYNTH_REFERENCE is an optional folder of real fields."""
 
 import os
 import sys

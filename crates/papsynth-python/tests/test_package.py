@@ -1,4 +1,4 @@
-"""What the package promises: the bytes of the command line, errors that name fields, and no harm from forks, threads and pickles.
+"""Tests of the package: bytes of the command line, errors that name fields, forks, threads and pickles.
 
 PAPSYNTH names the program to compare with.
 """
@@ -46,7 +46,7 @@ def test_truth_agrees_with_itself(frame):
     assert len(frame) == len(frame.masks) == len(table["id"]) == len(frame.boxes) == len(frame.rle) > 0
     assert all(len(column) == len(frame) for column in table.values())
     assert np.array_equal(frame.masks.sum(axis=(1, 2)), table["area_px"])
-    assert np.array_equal(frame.visible_masks.sum(axis=(1, 2)), table["front_area_px"])
+    assert np.array_equal(frame.visible_masks.sum(axis=(1, 2)), table["visible_area_px"])
     assert not (frame.visible_masks & ~frame.masks).any()
     for mask, box in zip(frame.masks, frame.boxes):
         if mask.any():
@@ -100,7 +100,7 @@ def test_data_sets_have_the_root_hash_of_the_command_line(tmp_path):
     words = ["--frames", "4", "--seed", "7", "--no-parquet"] if has_parquet() else ["--frames", "4", "--seed", "7"]
     subprocess.run([PROGRAM, "generate", "--out", tmp_path / "cli", "--quiet", *words, *WORDS], check=True)
     for part in range(3):
-        papsynth.generate(SMALL, tmp_path / "py", 4, seed=7, shard=(part, 3))
+        papsynth.generate(SMALL, tmp_path / "py", 4, seed=7, task=(part, 3))
     assert papsynth.merge(tmp_path / "py", 4) == papsynth.verify(tmp_path / "cli", 4)["root"]
 
 
@@ -108,27 +108,27 @@ def has_parquet():
     return "--no-parquet" in subprocess.run([PROGRAM, "generate", "--help"], capture_output=True, text=True, check=True).stdout
 
 
-def test_scenes_of_a_data_set_give_its_frames_again(tmp_path):
+def test_scenes_of_a_data_set_reproduce_its_frames(tmp_path):
     papsynth.generate(SMALL, tmp_path / "set", 2, seed=7, scenes=True)
     again = papsynth.render(SMALL, scene=tmp_path / "set/scenes/000001.json")
     assert np.array_equal(again.image, papsynth.render(SMALL, seed=7, index=1).image)
 
 
-def test_data_sets_go_on_and_say_what_is_missing(tmp_path):
+def test_data_sets_continue_and_list_missing_shards(tmp_path):
     seen = []
-    first = papsynth.generate(SMALL, tmp_path / "set", 4, shard=(0, 2), progress=seen.append)
-    assert first == {"kept": 0, "made": 2} and sorted(seen) == [0, 2]
+    first = papsynth.generate(SMALL, tmp_path / "set", 4, task=(0, 2), progress=seen.append)
+    assert first == {"written": 2, "present": 0} and sorted(seen) == [0, 2]
     assert papsynth.missing(tmp_path / "set", 4) == [1, 3]
-    with pytest.raises(ValueError, match="2 shards are missing: 1, 3"):
+    with pytest.raises(ValueError, match="2 shards missing: 1, 3"):
         papsynth.merge(tmp_path / "set", 4)
-    assert papsynth.generate(SMALL, tmp_path / "set", 4) == {"kept": 2, "made": 2}
+    assert papsynth.generate(SMALL, tmp_path / "set", 4) == {"written": 2, "present": 2}
     papsynth.merge(tmp_path / "set", 4)
     image = tmp_path / "set/images/000002.png"
     image.write_bytes(image.read_bytes()[:-1])
     assert [path for path, _ in papsynth.verify(tmp_path / "set")["findings"]] == ["images/000002.png"]
     with pytest.raises(ValueError, match="seed"):
         papsynth.generate(SMALL, tmp_path / "set", 4, seed=1)
-    for wrong in ({"shard": (2, 2)}, {"threads": 0}, {"formats": ["jpeg"]}, {"frames_per_shard": 0}):
+    for wrong in ({"task": (2, 2)}, {"threads": 0}, {"formats": ["jpeg"]}, {"frames_per_shard": 0}):
         with pytest.raises(ValueError):
             papsynth.generate(SMALL, tmp_path / "none", 4, **wrong)
     with pytest.raises(OSError):
@@ -143,7 +143,7 @@ def test_data_sets_go_on_and_say_what_is_missing(tmp_path):
         ({"field": {"width_px": 7}}, "field.width_px"),
         ({"field": {"width_px": float("nan")}}, "field.width_px"),
         ({"focus": {"planes": {"uniform": [3, 1]}}}, "focus.planes"),
-        ({"layout": {"kind": "swath"}, "cells": {"nobody": {"count": 3}}}, "cells.nobody"),
+        ({"layout": {"kind": "band"}, "cells": {"unknown": {"count": 3}}}, "cells.unknown"),
         ({"cytoplasm": {"sheet": "xpdb"}}, "cytoplasm.sheet"),
     ],
 )
@@ -151,10 +151,10 @@ def test_errors_name_the_field(recipe, field):
     with pytest.raises(papsynth.RecipeError) as caught:
         papsynth.render(recipe)
     assert caught.value.field == field and field in str(caught.value)
-    assert pickle.loads(pickle.dumps(caught.value)).faults == caught.value.faults
+    assert pickle.loads(pickle.dumps(caught.value)).errors == caught.value.errors
 
 
-def test_other_nonsense_is_refused(tmp_path):
+def test_invalid_arguments_are_rejected(tmp_path):
     for recipe in (7, {3: 4}, {"field": None}, {"field": {"width_px": object()}}, "no-such-preset.toml", tmp_path):
         with pytest.raises((ValueError, TypeError, OSError)):
             papsynth.render(recipe)
@@ -179,7 +179,7 @@ def test_numbers_of_numpy_and_distributions_are_numbers():
     assert np.array_equal(plain.image, numpy.image)
 
 
-def test_threads_change_no_byte_and_work_side_by_side(frame):
+def test_threads_do_not_change_the_result(frame):
     assert np.array_equal(papsynth.render(SMALL, seed=7, index=3, threads=2).image, frame.image)
     images = {}
 
@@ -237,7 +237,7 @@ def _whole(index):
     return papsynth.render(SMALL, seed=7, index=index)
 
 
-def test_frames_come_whole_from_other_processes(frame):
+def test_frames_survive_pickling(frame):
     colour = papsynth.render({**SMALL, "light": {"kind": "colour"}, "focus": {"planes": 2}})
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         others = [(frame, pool.apply_async(_whole, (3,)).get(timeout=120)), (colour, pickle.loads(pickle.dumps(colour)))]
@@ -256,16 +256,16 @@ def test_frames_come_whole_from_other_processes(frame):
             restore(*state[:4], [damaged])
 
 
-def test_a_pickle_of_another_version_is_refused():
+def test_a_pickle_of_another_version_is_rejected():
     state = papsynth.Dataset(SMALL).__getstate__() | {"_made_by": "0.0.1 (streams of version 0)"}
     with pytest.raises(ValueError, match=r"0\.0\.1"):
         papsynth.Dataset(SMALL).__setstate__(state)
 
 
-def test_an_interrupt_ends_a_long_render_and_leaves_nothing_half_written(tmp_path):
-    # A parent in the background may have told its children to ignore it.
-    heeds = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
-    script = heeds + "; import papsynth; print('begun', flush=True); papsynth.{}"
+def test_an_interrupt_ends_a_render_without_partial_files(tmp_path):
+    # A background shell may have set its children to ignore SIGINT.
+    handler = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    script = handler + "; import papsynth; print('begun', flush=True); papsynth.{}"
     for call in (
         "render({'focus': {'planes': 200}, 'field': {'width_px': 600, 'height_px': 600}})",
         f"generate({SMALL!r}, {str(tmp_path / 'set')!r}, 100000)",
@@ -274,14 +274,14 @@ def test_an_interrupt_ends_a_long_render_and_leaves_nothing_half_written(tmp_pat
         assert child.stdout.readline() == "begun\n"
         threading.Event().wait(2)
         child.send_signal(2)
-        _, complaint = child.communicate(timeout=60)
-        assert child.returncode != 0 and "KeyboardInterrupt" in complaint, complaint
+        _, error = child.communicate(timeout=60)
+        assert child.returncode != 0 and "KeyboardInterrupt" in error, error
     assert not list(Path(tmp_path).rglob("*.tmp"))
     done = 100000 - len(papsynth.missing(tmp_path / "set", 100000))
-    assert papsynth.generate(SMALL, tmp_path / "set", max(done, 1))["kept"] >= done
+    assert papsynth.generate(SMALL, tmp_path / "set", max(done, 1))["present"] >= done
 
 
-def test_recipes_are_completed_and_described():
+def test_recipes_are_completed_and_have_a_schema():
     whole = papsynth.recipe(SMALL)
     assert whole["field"]["width_px"] == 320 and "optics" in whole and "cells" in whole
     assert np.array_equal(papsynth.render(whole, seed=2).image, papsynth.render(SMALL, seed=2).image)
@@ -289,7 +289,7 @@ def test_recipes_are_completed_and_described():
     assert json.dumps(papsynth.schema())
 
 
-def test_techniques_work_alone_and_say_what_is_wrong():
+def test_techniques_work_and_reject_invalid_arguments():
     angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
     circle = np.stack([50 + 40 * np.cos(angle), 50 + 30 * np.sin(angle)], axis=1)
     y, x = np.mgrid[:100, :100]
@@ -386,7 +386,7 @@ def test_a_class_is_learned_and_rendered():
     assert "mine" in frame.table["class"]
     samples = papsynth.Dataset({**SMALL, "cells": {"mine": {"count": 3}}}, seed=1, model=model)
     assert np.array_equal(pickle.loads(pickle.dumps(samples))[0].image, frame.image)
-    for wrong in ({"like": "nobody"}, {"pixel_um": -1.0}, {"nuclei": nuclei[:1]}, {"cytoplasm_outlines": [np.zeros((4, 3))]}, {"nuclei": [(np.ones((3, 3)), np.ones((4, 4)))]}):
+    for wrong in ({"like": "unknown"}, {"pixel_um": -1.0}, {"nuclei": nuclei[:1]}, {"cytoplasm_outlines": [np.zeros((4, 3))]}, {"nuclei": [(np.ones((3, 3)), np.ones((4, 4)))]}):
         with pytest.raises(ValueError):
             papsynth.learn(**{"name": "mine", "pixel_um": 0.25, "nuclei": nuclei, "like": "intermediate", **wrong})
 
@@ -404,7 +404,7 @@ def test_a_microscope_is_measured():
     assert abs(found["edge"]["sigma_px"] - 0.9) < 0.02 and "focus" not in found
     assert abs(found["recipe_gaussian"]["optics"]["sigma_xy_um"] - 0.18) < 0.005
     assert papsynth.recipe(found["recipe"])["optics"]["kind"] == "bright-field"
-    # A disk with spots, blurred more with each plane from the fourth.
+    # A disc with spots, blurred in proportion to the distance from the fourth plane.
     planes = []
     for plane in range(9):
         sigma = (0.8**2 + (0.6 * (plane - 4)) ** 2) ** 0.5
@@ -448,7 +448,7 @@ def test_fields_are_judged():
     recipe = {"field": {"width_px": 640, "height_px": 480}}
     one, other = ([papsynth.render(recipe, seed=seed, index=index).image for index in range(6)] for seed in (1, 2))
     report = papsynth.judge(one, other, 0.25, quick=True)
-    assert report["verdict"] and report == papsynth.judge(one, other, 0.25, quick=True, threads=1)
+    assert report["conclusion"] and report == papsynth.judge(one, other, 0.25, quick=True, threads=1)
     for wrong in ((one[:1], other, 0.25), (one, other, -1.0), (one, [np.zeros(3)] * 3, 0.25), ([], other, 0.25)):
         with pytest.raises((ValueError, TypeError)):
             papsynth.judge(*wrong)
@@ -472,7 +472,7 @@ def test_a_frame_is_saved_as_a_picture(tmp_path):
         frame = papsynth.render(recipe, 3, 1)
         frame.save(tmp_path / "field.png")
         picture = np.asarray(Image.open(tmp_path / "field.png"))
-        # Of 12 bits the lowest stand as they are.
+        # The lowest of 12 bits are kept.
         assert picture.shape == frame.image.shape and (picture == frame.image).all(), recipe
     with pytest.raises(OSError, match="nowhere"):
         frame.save(tmp_path / "field.png" / "nowhere.png")
@@ -500,7 +500,7 @@ def test_a_data_set_is_its_own_wherever_it_is_unpickled(tmp_path, monkeypatch):
 def test_a_file_that_a_recipe_names_is_read_again(tmp_path):
     from PIL import Image
 
-    recipe = {**SMALL, "layout": {"kind": "map", "path": str(tmp_path / "map.png")}}
+    recipe = {**SMALL, "layout": {"kind": "density-map", "path": str(tmp_path / "map.png")}}
     seen = []
     for half in (slice(0, 32), slice(32, 64)):
         grey = np.zeros((64, 64), np.uint8)

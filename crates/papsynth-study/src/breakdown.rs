@@ -1,4 +1,4 @@
-//! Right answers by what is known of a patch.
+//! Correct answers by properties of the patches.
 
 use std::collections::BTreeMap;
 
@@ -9,28 +9,28 @@ use crate::parameters::Value;
 use crate::saved::Judged;
 use crate::score::Proportion;
 
-/// So many different values are a group each; more numbers are sorted into thirds.
-const FEW_VALUES: usize = 3;
+/// Up to this number, each distinct value is a group; more numbers are divided into thirds.
+const MAX_SINGLE_VALUES: usize = 3;
 
-/// Texts of more kinds than this are not broken down by: what is left in each group says nothing.
-const MOST_TEXTS: usize = 12;
+/// Parameters with more distinct texts have no breakdown: the groups would be too small.
+const MAX_TEXTS: usize = 12;
 
 pub(crate) const FIELD: &str = "field";
 
-/// Right answers where a parameter had one value, or lay between two.
+/// Correct answers for one value or range of a parameter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Group {
-    /// Of which side the parameter is.
+    /// The side of the patch with the parameter.
     pub side: Side,
-    /// Its name; that of the patches' field is `field`.
+    /// Name of the parameter; `field` for the field of the patch.
     pub parameter: String,
-    /// What it was.
+    /// Its value or range.
     pub value: String,
-    /// Right answers among all.
+    /// Fraction of correct answers.
     pub correct: Proportion,
 }
 
-/// Right answers by what is known of the synthetic patch, then by field.
+/// Returns the correct answers by parameter of the synthetic patch, then by field.
 pub(crate) fn breakdown(judged: &[Judged]) -> Vec<Group> {
     let patches = || judged.iter().flat_map(|one| one.trial.patches.iter().map(move |patch| (one, patch)));
     let mut by_name: BTreeMap<&str, Vec<(&Value, bool)>> = BTreeMap::new();
@@ -53,7 +53,7 @@ pub(crate) fn breakdown(judged: &[Judged]) -> Vec<Group> {
     groups
 }
 
-/// Groups of one parameter: a few values each by itself, many numbers in thirds.
+/// Returns the groups of one parameter: one for each of a few values, or thirds of many numbers.
 fn by_value(name: &str, values: &[(&Value, bool)]) -> Vec<Group> {
     let mut numbers = Vec::new();
     let mut texts: BTreeMap<&str, Proportion> = BTreeMap::new();
@@ -78,23 +78,23 @@ fn by_value(name: &str, values: &[(&Value, bool)]) -> Vec<Group> {
         part.iter().for_each(|(_, is_correct)| correct.count(*is_correct));
         groups.push(group(value, correct));
     }
-    if texts.len() <= MOST_TEXTS {
+    if texts.len() <= MAX_TEXTS {
         groups.extend(texts.into_iter().map(|(text, correct)| group(text.to_owned(), correct)));
     }
-    // One group alone compares with nothing.
+    // A single group allows no comparison.
     if groups.len() > 1 { groups } else { Vec::new() }
 }
 
-/// Sorted values, each by itself if there are few, else in three parts of about the same length; equal values stay together.
+/// Divides sorted values into one part for each of a few distinct values, or into thirds. Equal values stay together.
 fn thirds(sorted: &[(f64, bool)]) -> Vec<&[(f64, bool)]> {
     let runs: Vec<&[(f64, bool)]> = sorted.chunk_by(|(a, _), (b, _)| a == b).collect();
-    if runs.len() <= FEW_VALUES {
+    if runs.len() <= MAX_SINGLE_VALUES {
         return runs;
     }
     let (mut parts, mut from, mut to) = (Vec::new(), 0, 0);
     for run in runs {
         to += run.len();
-        // The run that reaches a third of all ends it.
+        // The run that reaches a third of all values completes the part.
         if to * 3 >= sorted.len() * (parts.len() + 1) {
             parts.push(&sorted[from..to]);
             from = to;
@@ -103,7 +103,7 @@ fn thirds(sorted: &[(f64, bool)]) -> Vec<&[(f64, bool)]> {
     parts
 }
 
-/// A number in three figures.
+/// Formats a number with three significant digits.
 pub(crate) fn short(number: f64) -> String {
     let digits = match number.abs() {
         size if size >= 100.0 => 0,
@@ -120,16 +120,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn many_numbers_are_sorted_into_thirds_and_few_stand_alone() {
+    fn many_numbers_are_divided_into_thirds_and_few_are_single_groups() {
         let numbers: Vec<Value> = (0..31).map(|k| Value::Number(f64::from(k * 7 % 31))).collect();
         let values: Vec<_> = numbers.iter().map(|v| (v, true)).collect();
         let groups = by_value("p", &values);
         assert_eq!(groups.iter().map(|g| g.value.as_str()).collect::<Vec<_>>(), ["0 to 10", "11 to 20", "21 to 30"]);
-        assert_eq!(groups.iter().map(|g| g.correct.of).collect::<Vec<_>>(), [11, 10, 10]);
+        assert_eq!(groups.iter().map(|g| g.correct.total).collect::<Vec<_>>(), [11, 10, 10]);
         let few = [Value::Number(1.0), Value::Number(0.25), Value::Number(1.0)];
         let groups = by_value("p", &few.iter().map(|v| (v, false)).collect::<Vec<_>>());
         assert_eq!(
-            groups.iter().map(|g| (g.value.as_str(), g.correct.of)).collect::<Vec<_>>(),
+            groups.iter().map(|g| (g.value.as_str(), g.correct.total)).collect::<Vec<_>>(),
             [("0.25", 1), ("1", 2)]
         );
         let same = [Value::Number(1.0), Value::Number(1.0)];

@@ -1,4 +1,4 @@
-//! What a study asks: its parameters, and the order of its trials.
+//! The design of a study: parameters, and the order of trials.
 
 use portable_numerics::random::{below, shuffle};
 use rand_core::Rng;
@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 
-/// Longest name of a subject, bytes: it becomes the name of a folder.
+/// Longest name of a subject, bytes. It is the name of a folder.
 const LONGEST_NAME: usize = 64;
 
 /// The name of the row of random answers; no subject may have it.
 pub const RANDOM: &str = "x";
 
-/// An enum whose values have names: those of files, options and messages.
+/// Defines an enum whose values have names in files, options and messages.
 macro_rules! named {
     ($($(#[$about:meta])* $Kind:ident { $($(#[$of:meta])* $Value:ident = $name:literal,)* })*) => {$(
         $(#[$about])*
@@ -22,10 +22,10 @@ macro_rules! named {
         }
 
         impl $Kind {
-            /// All of them.
+            /// All values.
             pub const ALL: [Self; [$($name),*].len()] = [$(Self::$Value),*];
 
-            /// The name it goes by.
+            /// The name in files, options and messages.
             #[must_use]
             pub fn name(self) -> &'static str {
                 match self {
@@ -37,54 +37,54 @@ macro_rules! named {
 }
 
 named! {
-    /// The question of each trial.
-    Task {
-        /// One patch: real or synthetic? The paper's.
+    /// The design of each trial.
+    TrialDesign {
+        /// One patch: real or synthetic? As in the paper.
         YesNo = "yes-no",
-        /// Two patches, one of each side: which is real, left or right?
+        /// A real and a synthetic patch: which one is real, left or right?
         TwoAlternatives = "2afc",
     }
-    /// How grey levels are brought to 8 bits, on both sides alike.
+    /// Conversion of grey levels to 8 bits, the same for real and synthetic fields.
     Grey {
-        /// As they are; of deeper images, the full scale of the side's camera becomes 255.
+        /// Unchanged; for more than 8 bits, the full scale of the camera becomes 255.
         AsIs = "as-is",
-        /// Each field so that its bright glass becomes one level: how it was exposed tells nothing.
+        /// Each field is scaled so that its empty glass has a fixed level. This removes differences of exposure.
         Glass = "glass",
     }
-    /// Where an image comes from.
+    /// The source of an image.
     Side {
-        /// A microscope: the positives.
+        /// A microscope: positives.
         Real = "real",
-        /// A simulation: the negatives.
+        /// A simulation: negatives.
         Synthetic = "synthetic",
     }
-    /// What of a study counts.
+    /// The stage of a study.
     Stage {
-        /// For practice; not counted.
+        /// Practice; not counted.
         Training = "training",
         /// Counted.
         Counted = "counted",
     }
-    /// What a subject says.
+    /// The answer of a subject.
     Answer {
         /// The patch is real.
         Real = "real",
         /// The patch is synthetic.
         Synthetic = "synthetic",
-        /// Of two patches, the left one is real.
+        /// The left one of two patches is real.
         Left = "left",
-        /// Of two patches, the right one is real.
+        /// The right one of two patches is real.
         Right = "right",
     }
 }
 
 impl Answer {
-    /// Whether it is one that the task knows.
-    pub(crate) fn fits(self, task: Task) -> bool {
-        (task == Task::YesNo) == matches!(self, Self::Real | Self::Synthetic)
+    /// Whether the answer is valid for a design.
+    pub(crate) fn fits(self, task: TrialDesign) -> bool {
+        (task == TrialDesign::YesNo) == matches!(self, Self::Real | Self::Synthetic)
     }
 
-    /// Whether a positive was claimed: "real", or "left".
+    /// Whether the answer is positive: "real" or "left".
     pub(crate) fn is_positive(self) -> bool {
         matches!(self, Self::Real | Self::Left)
     }
@@ -94,29 +94,29 @@ impl Answer {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StudyParams {
-    /// Who looks: letters, digits, `-`, `_` and `.`, at most 64, not beginning with a dot, and not `x`. Default `1` (ours).
+    /// Name of the subject: at most 64 letters, digits, `-`, `_` and `.`, without a leading dot, not `x`. Default `1`.
     pub subject: String,
-    /// What is asked. Default yes-no (the paper's).
-    pub task: Task,
-    /// Trials that count, 1 to 10000. Default 118 (the paper's).
+    /// The design of the trials. Default yes-no (paper).
+    pub task: TrialDesign,
+    /// Number of counted trials, 1 to 10000. Default 118 (paper).
     pub trials: usize,
-    /// Trials for practice before them, 0 to 100. Default 2 (the paper's).
+    /// Number of practice trials before, 0 to 100. Default 2 (paper).
     pub training: usize,
-    /// How long a patch is shown, ms, 50 to 60000. Default 2000 (the paper's).
+    /// Exposure of a patch, ms, 50 to 60000. Default 2000 (paper).
     pub exposure_ms: u32,
-    /// Standard deviation of the Gaussian noise on every pixel, grey levels of 8 bits, 0 to 50. Default 0.7 (the paper's).
+    /// Standard deviation of the Gaussian noise of every pixel, grey levels of 8 bits, 0 to 50. Default 0.7 (paper).
     pub noise_dn: f64,
-    /// Side of a patch, pixels, 32 to 1024. Default 200 (the paper's).
+    /// Size of a patch, px, 32 to 1024. Default 200 (paper).
     pub patch_px: usize,
-    /// Fields of each side, 1 to 10000; if there are fewer, those there are. Default 25 (the paper's).
+    /// Largest number of real and of synthetic fields, 1 to 10000. Default 25 (paper).
     pub fields: usize,
-    /// Decides which fields, patches, order and noise. Default 0 (ours).
+    /// Seed of the selection of fields and patches, of the order and the noise. Default 0.
     pub seed: u64,
-    /// How grey levels are brought to 8 bits. Default as they are (the paper's).
+    /// Conversion of grey levels to 8 bits. Default as they are (paper).
     pub grey: Grey,
-    /// Size of a real pixel, µm, 0.01 to 100; nothing if it is not known. Default nothing (ours).
+    /// Pixel size of real images, µm, 0.01 to 100; `None` if unknown. Default `None`.
     pub real_pixel_um: Option<f64>,
-    /// Size of a synthetic pixel, µm, 0.01 to 100; nothing if it is unknown or the data set tells it. Default nothing (ours).
+    /// Pixel size of synthetic images, µm, 0.01 to 100; `None` if unknown or recorded in the data set. Default `None`.
     pub synthetic_pixel_um: Option<f64>,
 }
 
@@ -124,7 +124,7 @@ impl Default for StudyParams {
     fn default() -> Self {
         Self {
             subject: "1".to_owned(),
-            task: Task::YesNo,
+            task: TrialDesign::YesNo,
             trials: 118,
             training: 2,
             exposure_ms: 2000,
@@ -140,7 +140,7 @@ impl Default for StudyParams {
 }
 
 impl StudyParams {
-    /// Refuses what no study can have; the error names the parameter.
+    /// Checks the ranges; the error names the parameter.
     pub(crate) fn check(&self) -> Result<(), Error> {
         fn within<T: PartialOrd + std::fmt::Display>(
             field: &str,
@@ -157,30 +157,29 @@ impl StudyParams {
         within("noise_dn", self.noise_dn, 0.0..=50.0, "0 to 50 grey levels")?;
         within("patch_px", self.patch_px, 32..=1024, "32 to 1024 pixels")?;
         within("fields", self.fields, 1..=10_000, "1 to 10000")?;
-        // Sizes that are not known are fine.
+        // Unknown sizes are valid.
         within("real_pixel_um", self.real_pixel_um.unwrap_or(1.0), 0.01..=100.0, "0.01 to 100 µm")?;
         within("synthetic_pixel_um", self.synthetic_pixel_um.unwrap_or(1.0), 0.01..=100.0, "0.01 to 100 µm")
     }
 }
 
-/// A name becomes the name of a folder, and must not lead anywhere else.
+/// Checks that a name is safe as the name of a folder.
 pub(crate) fn check_name(subject: &str) -> Result<(), Error> {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
-    let fine = !subject.is_empty()
+    let is_valid = !subject.is_empty()
         && subject.len() <= LONGEST_NAME
         && subject.chars().all(plain)
         && !subject.starts_with('.')
         && subject != RANDOM;
-    if fine {
+    if is_valid {
         return Ok(());
     }
-    let expected = "1 to 64 letters, digits, `-`, `_` and `.`, not beginning with a dot; `x` is the random row";
+    let expected = "1 to 64 letters, digits, `-`, `_` and `.`, no leading dot; `x` is the random row";
     Err(Error::parameter("subject", format!("`{}`", subject.escape_debug()), expected))
 }
 
-/// Which sides each trial shows, one or two from left to right, and whether it counts: the training ones first; within each
-/// stage both sides (or both places of the real one) equally often, which of an odd number has one more being random, in a
-/// random order.
+/// Returns stage and sides (one, or two from left to right) of each trial, the training first. Within each stage, both
+/// sides, or both positions of the real patch, are equally frequent (an odd trial is random), in random order.
 pub(crate) fn order(params: &StudyParams, rng: &mut impl Rng) -> Vec<(Stage, Vec<Side>)> {
     let mut orders = Vec::with_capacity(params.training + params.trials);
     for (stage, count) in [(Stage::Training, params.training), (Stage::Counted, params.trials)] {
@@ -189,9 +188,9 @@ pub(crate) fn order(params: &StudyParams, rng: &mut impl Rng) -> Vec<(Stage, Vec
         shuffle(&mut sides, rng);
         orders.extend(sides.into_iter().map(|side| {
             let sides = match (params.task, side) {
-                (Task::YesNo, side) => vec![side],
-                (Task::TwoAlternatives, Side::Real) => vec![Side::Real, Side::Synthetic],
-                (Task::TwoAlternatives, Side::Synthetic) => vec![Side::Synthetic, Side::Real],
+                (TrialDesign::YesNo, side) => vec![side],
+                (TrialDesign::TwoAlternatives, Side::Real) => vec![Side::Real, Side::Synthetic],
+                (TrialDesign::TwoAlternatives, Side::Synthetic) => vec![Side::Synthetic, Side::Real],
             };
             (stage, sides)
         }));
@@ -211,16 +210,16 @@ mod tests {
     }
 
     #[test]
-    fn the_paper_s_defaults() {
+    fn defaults_are_those_of_the_paper() {
         let params = StudyParams::default();
-        assert_eq!((params.task, params.trials, params.training), (Task::YesNo, 118, 2));
+        assert_eq!((params.task, params.trials, params.training), (TrialDesign::YesNo, 118, 2));
         assert_eq!((params.exposure_ms, params.noise_dn, params.patch_px, params.fields), (2000, 0.7, 200, 25));
         params.check().unwrap();
     }
 
     #[test]
     fn both_sides_are_shown_equally_often_in_either_design() {
-        for task in Task::ALL {
+        for task in TrialDesign::ALL {
             for (seed, trials) in [(1, 118), (2, 10), (3, 7), (4, 1)] {
                 let params = StudyParams { task, trials, ..StudyParams::default() };
                 let orders = order(&params, &mut rng(seed));
@@ -232,17 +231,17 @@ mod tests {
                     assert!(real_first.abs_diff(of_stage.len() - real_first) <= 1, "{task:?} {trials}");
                 }
                 assert!(orders.iter().all(|(_, sides)| match task {
-                    Task::YesNo => sides.len() == 1,
-                    Task::TwoAlternatives => sides.len() == 2 && sides[0] != sides[1],
+                    TrialDesign::YesNo => sides.len() == 1,
+                    TrialDesign::TwoAlternatives => sides.len() == 2 && sides[0] != sides[1],
                 }));
             }
         }
     }
 
     #[test]
-    fn no_place_in_the_order_tells_the_side() {
-        // Over many seeds each trial is real half the time, and one trial tells nothing of the next: within 4.5
-        // standard errors of ½, over 119 places.
+    fn the_position_in_the_order_does_not_predict_the_side() {
+        // Over many seeds, each trial is real in half of the cases, and a trial does not predict the next one: within
+        // 4.5 standard errors of ½, over 119 positions.
         let runs = 2000;
         let params = StudyParams { training: 0, ..StudyParams::default() };
         let all: Vec<Vec<bool>> = (0..runs)
@@ -250,17 +249,17 @@ mod tests {
             .collect();
         let bound = 4.5 * (0.25 / runs as f64).sqrt();
         for place in 0..118 {
-            let share = all.iter().filter(|order| order[place]).count() as f64 / runs as f64;
-            assert!((share - 0.5).abs() < bound, "trial {place}: {share}");
+            let fraction = all.iter().filter(|order| order[place]).count() as f64 / runs as f64;
+            assert!((fraction - 0.5).abs() < bound, "trial {place}: {fraction}");
         }
         let repeats: usize = all.iter().map(|order| order.windows(2).filter(|pair| pair[0] == pair[1]).count()).sum();
-        // Of a balanced order, 58 of the 117 others are like a given one.
-        let share = repeats as f64 / (runs as f64 * 117.0);
-        assert!((share - 58.0 / 117.0).abs() < 4.5 * (0.25 / (runs as f64 * 117.0)).sqrt(), "{share}");
+        // In a balanced order, 58 of the 117 other trials have the side of a given one.
+        let fraction = repeats as f64 / (runs as f64 * 117.0);
+        assert!((fraction - 58.0 / 117.0).abs() < 4.5 * (0.25 / (runs as f64 * 117.0)).sqrt(), "{fraction}");
     }
 
     #[test]
-    fn wrong_parameters_are_named() {
+    fn invalid_parameters_are_named() {
         let good = StudyParams::default();
         let nan = f64::NAN;
         let wrong = [

@@ -1,24 +1,24 @@
-//! What can go wrong.
+//! Errors.
 
 use std::fmt::Display;
 use std::io;
 use std::path::Path;
 
-/// Why a study cannot begin or go on.
+/// An error of a study.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// What was asked for cannot be, or what lies there is not what is expected; the message names it.
+    /// The input is invalid; the message states what and why.
     #[error("{0}")]
     Refused(String),
-    /// An image or a data set cannot be read, or the system refused to read or write.
+    /// An image or a data set cannot be read, or a file operation failed.
     #[error(transparent)]
     Dataset(#[from] papsynth_dataset::Error),
 }
 
 impl Error {
-    /// Whether the system failed (full disk, no permission), so that trying again may help; everything else lies in what was
-    /// asked for.
+    /// Whether the system failed (full disk, no permission), so that a retry may succeed. All other errors are in the
+    /// input.
     #[must_use]
     pub fn is_io(&self) -> bool {
         matches!(self, Self::Dataset(error) if error.is_io())
@@ -26,14 +26,14 @@ impl Error {
 
     pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
         move |source| match source.kind() {
-            // A name that leads nowhere is what was asked for.
+            // A missing file is an error of the input.
             io::ErrorKind::NotFound => Self::Refused(format!("cannot {action} {}: {source}", path.display())),
             _ => papsynth_dataset::Error::Io { action, path: path.to_owned(), source }.into(),
         }
     }
 
     pub(crate) fn parameter(field: &str, value: impl Display, expected: &str) -> Self {
-        Self::Refused(format!("{field}: {value} is not accepted; expected {expected}"))
+        Self::Refused(format!("{field}: {value} is invalid; expected {expected}"))
     }
 
     pub(crate) fn folder(path: &Path, message: impl Display) -> Self {

@@ -1,16 +1,16 @@
-//! Random numbers, and what they hang on.
+//! Keys of random streams.
 
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use sha2::{Digest, Sha256};
 
-/// What random numbers of a study hang on, besides what each is for.
+/// The key of all random streams of a study.
 #[derive(Debug, Clone)]
 pub(crate) struct Key {
     seed: u64,
-    /// SHA-256 of the hashes of all fields: who knows the program and the seed still knows no order without the fields.
+    /// SHA-256 of the hashes of all fields: without the fields, the order of trials cannot be predicted.
     fields: [u8; 32],
-    /// Empty for what all subjects share.
+    /// Empty for streams that are equal for all subjects.
     subject: String,
 }
 
@@ -23,12 +23,12 @@ impl Key {
         Self { seed, fields: fields.finalize().into(), subject: subject.to_owned() }
     }
 
-    /// The stream of one purpose, of one thing of many.
+    /// Returns the random stream of a purpose and an index.
     pub(crate) fn stream(&self, purpose: &str, index: usize) -> Xoshiro256PlusPlus {
         Xoshiro256PlusPlus::from_seed(self.hash(purpose, index))
     }
 
-    /// 32 hexadecimal digits that name one thing of a purpose and tell nothing else of it.
+    /// Returns an unpredictable name of 32 hexadecimal digits for a purpose and an index.
     pub(crate) fn name(&self, purpose: &str, index: usize) -> String {
         hex(&self.hash(purpose, index)[..16])
     }
@@ -56,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_part_of_a_key_matters_and_the_same_gives_the_same() {
+    fn every_part_of_a_key_changes_the_stream() {
         let key = |seed, subject: &str, field: &str| Key::new(seed, subject, [field].iter());
         let first = key(1, "a", "f").name("trial", 3);
         assert_eq!(first, key(1, "a", "f").name("trial", 3));

@@ -1,4 +1,4 @@
-//! What is known of a synthetic patch, for sorting answers by it.
+//! Properties of synthetic patches, for the breakdown of answers.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::Error;
 use crate::fields::{Field, Frame, Root};
 
-/// A value to sort by: a number, or a line of a recipe that is none.
+/// The value of a parameter: a number, or the text of another recipe value.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub(crate) enum Value {
@@ -16,20 +16,20 @@ pub(crate) enum Value {
     Text(String),
 }
 
-/// Names and values; names end in their unit.
+/// Names and values of parameters. Names end in their unit.
 pub(crate) type Parameters = BTreeMap<String, Value>;
 
-/// An object of a field, or a part of a cell: what is read of its row in the table.
+/// The columns that are read for an object or part of a cell.
 #[derive(Debug, Clone, Deserialize)]
 struct Row {
     part: String,
     kind: String,
-    stain: f64,
+    mean_absorbance: f64,
     bbox_x_px: f64,
     bbox_y_px: f64,
     bbox_width_px: f64,
     bbox_height_px: f64,
-    /// One a plane, separated by semicolons.
+    /// One value for each plane, separated by semicolons.
     defocus_um: String,
 }
 
@@ -46,20 +46,20 @@ impl Objects {
     fn parse(text: &str, path: &Path) -> Result<Self, Error> {
         let mut reader = csv::Reader::from_reader(text.as_bytes());
         let rows = reader.deserialize().collect::<Result<_, _>>();
-        rows.map(Self).map_err(|error| Error::folder(path, format!("is no table of objects: {error}")))
+        rows.map(Self).map_err(|error| Error::folder(path, format!("not a valid table of objects: {error}")))
     }
 
-    /// What is known of a patch, a square given in pixels of the field's own file.
-    pub(crate) fn of_patch(&self, frame: &Frame, place: [f64; 2], side: f64) -> Parameters {
+    /// Returns the parameters of a square patch in pixels of the file.
+    pub(crate) fn of_patch(&self, frame: &Frame, corner: [f64; 2], side: f64) -> Parameters {
         let touches = |row: &&Row| {
-            row.bbox_x_px < place[0] + side
-                && place[0] < row.bbox_x_px + row.bbox_width_px
-                && row.bbox_y_px < place[1] + side
-                && place[1] < row.bbox_y_px + row.bbox_height_px
+            row.bbox_x_px < corner[0] + side
+                && corner[0] < row.bbox_x_px + row.bbox_width_px
+                && row.bbox_y_px < corner[1] + side
+                && corner[1] < row.bbox_y_px + row.bbox_height_px
         };
-        let shown: Vec<&Row> = self.0.iter().filter(touches).collect();
+        let touching: Vec<&Row> = self.0.iter().filter(touches).collect();
         let plane = frame.summary.planes_um.len() / 2;
-        let part = |part: &'static str| shown.iter().filter(move |row| row.kind == "cell" && row.part == part);
+        let part = |part: &'static str| touching.iter().filter(move |row| row.kind == "cell" && row.part == part);
         let cells = |rows: &[Row]| rows.iter().filter(|row| row.part == "cytoplasm").count() as f64;
         let defocus = |row: &&&Row| row.defocus_um.split(';').nth(plane).and_then(|um| um.parse::<f64>().ok());
         let area_mm2 = {
@@ -68,13 +68,13 @@ impl Objects {
         };
         let numbers = [
             ("field_cells_per_mm2", Some(cells(&self.0) / area_mm2)),
-            ("field_most_layers", Some(f64::from(frame.summary.most_layers))),
+            ("field_max_overlap", Some(f64::from(frame.summary.max_overlap))),
             ("patch_cells", Some(part("cytoplasm").count() as f64)),
             ("patch_nuclei", Some(part("nucleus").count() as f64)),
-            ("patch_debris", Some(shown.iter().filter(|row| row.kind != "cell").count() as f64)),
+            ("patch_debris", Some(touching.iter().filter(|row| row.kind != "cell").count() as f64)),
             ("patch_defocus_um", mean(part("cytoplasm").filter_map(|row| defocus(&row).map(f64::abs)))),
-            ("patch_cytoplasm_stain", mean(part("cytoplasm").map(|row| row.stain))),
-            ("patch_nucleus_stain", mean(part("nucleus").map(|row| row.stain))),
+            ("patch_cytoplasm_absorbance", mean(part("cytoplasm").map(|row| row.mean_absorbance))),
+            ("patch_nucleus_absorbance", mean(part("nucleus").map(|row| row.mean_absorbance))),
         ];
         let known = numbers.into_iter().filter_map(|(name, value)| Some((name, value.filter(|v| v.is_finite())?)));
         known.map(|(name, value)| (name.to_owned(), Value::Number(value))).collect()
@@ -86,7 +86,7 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0.0).then(|| sum / count)
 }
 
-/// The lines of their recipes in which fields differ, for each field: what was varied between data sets.
+/// Returns for each field the recipe values in which the fields differ.
 pub(crate) fn varied(fields: &[&Field]) -> Vec<Parameters> {
     let none = BTreeMap::new();
     let recipes: Vec<&BTreeMap<String, toml::Value>> =
@@ -124,23 +124,26 @@ mod tests {
                 height: 1000,
                 pixel_um: 0.25,
                 bits: 8,
+                training_bits: 8,
                 channels: 1,
                 slide: 0,
                 planes_um: vec![-1.0, 0.0, 1.0],
-                saturated: Vec::new(),
-                floored: Vec::new(),
+                saturated_px: Vec::new(),
+                clipped_px: Vec::new(),
+                attempts: 1,
+                cells: std::collections::BTreeMap::new(),
                 objects: BTreeMap::new(),
                 truncated: 0,
-                most_layers: 3,
-                lost_px: BTreeMap::new(),
+                max_overlap: 3,
+                occluded_px: BTreeMap::new(),
             },
             recipe: Arc::new(recipe.into_iter().collect()),
         }
     }
 
     #[test]
-    fn a_patch_knows_what_lies_on_it() {
-        let table = "image,part,kind,stain,bbox_x_px,bbox_y_px,bbox_width_px,bbox_height_px,defocus_um,other\n\
+    fn parameters_are_those_of_the_objects_on_a_patch() {
+        let table = "image,part,kind,mean_absorbance,bbox_x_px,bbox_y_px,bbox_width_px,bbox_height_px,defocus_um,other\n\
             0,cytoplasm,cell,0.2,100,100,50,50,1;-2;3,a\n\
             0,nucleus,cell,0.6,120,120,10,10,1;-2;3,a\n\
             0,cytoplasm,cell,0.4,190,0,50,300,1;4;3,a\n\
@@ -155,14 +158,14 @@ mod tests {
         assert_eq!(number("field_cells_per_mm2"), 3.0 / 0.0625);
         assert_eq!([number("patch_cells"), number("patch_nuclei"), number("patch_debris")], [2.0, 1.0, 1.0]);
         assert_eq!(number("patch_defocus_um"), 3.0);
-        assert!((number("patch_cytoplasm_stain") - 0.3).abs() < 1e-12);
-        // Where there is no nucleus its stain is not known.
-        assert!(!objects.of_patch(&frame(""), [500.0, 500.0], 200.0).contains_key("patch_nucleus_stain"));
+        assert!((number("patch_cytoplasm_absorbance") - 0.3).abs() < 1e-12);
+        // Without a nucleus there is no absorbance.
+        assert!(!objects.of_patch(&frame(""), [500.0, 500.0], 200.0).contains_key("patch_nucleus_absorbance"));
         assert!(Objects::parse("a,b\n1,2\n", Path::new("t.csv")).is_err());
     }
 
     #[test]
-    fn what_recipes_differ_in_is_found() {
+    fn differing_recipe_values_are_found() {
         let field =
             |recipe: Option<&str>| Field { name: String::new(), path: PathBuf::new(), frame: recipe.map(frame) };
         let fields = [field(Some("a = 1\nb = 2.5\nc = [1, 2]")), field(Some("a = 1\nb = 3\nc = [1, 3]"))];

@@ -1,26 +1,26 @@
-//! Arithmetic of answers: Table 1 of the paper, intervals, signal detection.
+//! Statistics of answers: Table 1 of the paper, intervals, signal detection.
 
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_2_PI, PI, SQRT_2};
 
 use serde::Serialize;
 
-use crate::design::Task;
+use crate::design::TrialDesign;
 
-/// Half the width of the interval that a claim about realism is usually made with: ±5 points.
-pub const CLAIM_HALF_WIDTH: f64 = 0.05;
+/// Default half-width of the interval of a fraction: ±5 points.
+pub const DEFAULT_HALF_WIDTH: f64 = 0.05;
 
 /// The four counts of Table 1. As in the paper, a real image is a positive and a synthetic one a negative.
 ///
-/// Of two alternatives, a positive is a pair whose real image stands on the left.
+/// For two alternatives, a positive is a pair with the real image on the left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Counts {
-    /// True positives: real, and taken for real.
+    /// True positives: real, judged real.
     pub tp: u64,
-    /// False positives: synthetic, and taken for real.
+    /// False positives: synthetic, judged real.
     pub fp: u64,
-    /// True negatives: synthetic, and taken for synthetic.
+    /// True negatives: synthetic, judged synthetic.
     pub tn: u64,
-    /// False negatives: real, and taken for synthetic.
+    /// False negatives: real, judged synthetic.
     #[serde(rename = "fn")]
     pub fn_: u64,
 }
@@ -36,7 +36,7 @@ impl Counts {
         *cell += 1;
     }
 
-    /// The counts of both together.
+    /// Returns the sum of the counts.
     #[must_use]
     pub fn plus(self, other: Self) -> Self {
         Self { tp: self.tp + other.tp, fp: self.fp + other.fp, tn: self.tn + other.tn, fn_: self.fn_ + other.fn_ }
@@ -48,33 +48,33 @@ impl Counts {
         self.tp + self.fp + self.tn + self.fn_
     }
 
-    /// TP / (TP + FN): real images that were taken for real.
+    /// TP / (TP + FN): fraction of real images judged real.
     #[must_use]
     pub fn sensitivity(&self) -> Proportion {
-        Proportion { hits: self.tp, of: self.tp + self.fn_ }
+        Proportion { hits: self.tp, total: self.tp + self.fn_ }
     }
 
-    /// TN / (TN + FP): synthetic images that were taken for synthetic.
+    /// TN / (TN + FP): fraction of synthetic images judged synthetic.
     #[must_use]
     pub fn specificity(&self) -> Proportion {
-        Proportion { hits: self.tn, of: self.tn + self.fp }
+        Proportion { hits: self.tn, total: self.tn + self.fp }
     }
 
-    /// (TP + TN) / all: right answers.
+    /// (TP + TN) / all: fraction of correct answers.
     #[must_use]
     pub fn accuracy(&self) -> Proportion {
-        Proportion { hits: self.tp + self.tn, of: self.trials() }
+        Proportion { hits: self.tp + self.tn, total: self.trials() }
     }
 
     /// Sensitivity d′ and criterion c of signal detection.
     ///
     /// H = (TP + ½) / (TP + FN + 1) and F = (FP + ½) / (FP + TN + 1): the log-linear correction (Hautus 1995,
-    /// [doi:10.3758/BF03203619](https://doi.org/10.3758/BF03203619)), which is always made, so that rates of 0 and 1 are no
-    /// exception. Then d′ = Φ⁻¹(H) − Φ⁻¹(F), divided by √2 of two alternatives, and c = −(Φ⁻¹(H) + Φ⁻¹(F)) / 2: negative if
-    /// "real" (or "left") is said too readily. The interval of d′ is that of Gourevitch and Galanter (1967,
+    /// [doi:10.3758/BF03203619](https://doi.org/10.3758/BF03203619)), applied to all rates, also other than 0 and 1.
+    /// Then d′ = Φ⁻¹(H) − Φ⁻¹(F), divided by √2 for two alternatives, and c = −(Φ⁻¹(H) + Φ⁻¹(F)) / 2: negative for
+    /// a bias to "real" (or "left"). The interval of d′ is that of Gourevitch and Galanter (1967,
     /// [doi:10.1007/BF02289402](https://doi.org/10.1007/BF02289402)).
     #[must_use]
-    pub fn detection(&self, task: Task) -> Detection {
+    pub fn detection(&self, task: TrialDesign) -> Detection {
         let rate = |hits: u64, of: u64| (hits as f64 + 0.5) / (of as f64 + 1.0);
         let (positives, negatives) = (self.tp + self.fn_, self.fp + self.tn);
         let (hits, alarms) = (rate(self.tp, positives), rate(self.fp, negatives));
@@ -84,8 +84,8 @@ impl Counts {
             rate * (1.0 - rate) / ((of as f64 + 1.0) * height * height)
         };
         let scale = match task {
-            Task::YesNo => 1.0,
-            Task::TwoAlternatives => FRAC_1_SQRT_2,
+            TrialDesign::YesNo => 1.0,
+            TrialDesign::TwoAlternatives => FRAC_1_SQRT_2,
         };
         let d_prime = scale * (z_hits - z_alarms);
         let error = scale * (variance(hits, z_hits, positives) + variance(alarms, z_alarms, negatives)).sqrt();
@@ -97,57 +97,58 @@ impl Counts {
     }
 }
 
-/// What signal detection says of the answers.
+/// Measures of signal detection.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Detection {
-    /// Distance between real and synthetic in standard deviations; 0 if they are not told apart.
+    /// Distance between real and synthetic in standard deviations; 0 if they are not distinguished.
     pub d_prime: f64,
-    /// Its interval of 95 %.
+    /// 95 % interval of d′.
     pub d_prime_interval: Interval,
-    /// Bias: 0 if there is none.
+    /// Bias; 0 without bias.
     pub criterion: f64,
 }
 
-/// So many of so many.
+/// A fraction of counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Proportion {
-    /// How many did.
+    /// Number of hits.
     pub hits: u64,
-    /// How many could.
-    pub of: u64,
+    /// Number of trials.
+    pub total: u64,
 }
 
-/// From a least to a largest value.
+/// An interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Interval {
-    /// The least.
+    /// Lower end.
     pub low: f64,
-    /// The largest.
+    /// Upper end.
     pub high: f64,
 }
 
 impl Proportion {
     pub(crate) fn count(&mut self, is_hit: bool) {
         self.hits += u64::from(is_hit);
-        self.of += 1;
+        self.total += 1;
     }
 
-    /// The fraction, or nothing of nothing.
+    /// The fraction; `None` without trials.
     #[must_use]
     pub fn value(&self) -> Option<f64> {
-        (self.of > 0).then(|| self.hits as f64 / self.of as f64)
+        (self.total > 0).then(|| self.hits as f64 / self.total as f64)
     }
 
-    /// Wilson's score interval of 95 % ([doi:10.1080/01621459.1927.10502953](https://doi.org/10.1080/01621459.1927.10502953)):
-    /// (p + z²/2n ± z √(p(1−p)/n + z²/4n²)) / (1 + z²/n). Of nothing it reaches from 0 to 1.
+    /// Wilson's score interval of 95 %
+    /// ([doi:10.1080/01621459.1927.10502953](https://doi.org/10.1080/01621459.1927.10502953)): (p + z²/2n ± z
+    /// √(p(1−p)/n + z²/4n²)) / (1 + z²/n). It is 0 to 1 without trials.
     #[must_use]
     pub fn wilson(&self) -> Interval {
         let Some(p) = self.value() else { return Interval { low: 0.0, high: 1.0 } };
-        let n = self.of as f64;
+        let n = self.total as f64;
         let z2 = Z_95 * Z_95;
         let centre = (p + z2 / (2.0 * n)) / (1.0 + z2 / n);
         let half = Z_95 * (p * (1.0 - p) / n + z2 / (4.0 * n * n)).sqrt() / (1.0 + z2 / n);
-        // Rounding must not lead out of what a fraction can be, nor past the fraction itself.
+        // Keeps the ends in 0 to 1, and the fraction between them, in spite of rounding.
         Interval { low: (centre - half).clamp(0.0, p), high: (centre + half).clamp(p, 1.0) }
     }
 }
@@ -157,26 +158,27 @@ impl Serialize for Proportion {
         #[derive(Serialize)]
         struct Shown {
             hits: u64,
-            of: u64,
+            total: u64,
             value: Option<f64>,
             wilson_95: Interval,
         }
-        Shown { hits: self.hits, of: self.of, value: self.value(), wilson_95: self.wilson() }.serialize(serializer)
+        Shown { hits: self.hits, total: self.total, value: self.value(), wilson_95: self.wilson() }
+            .serialize(serializer)
     }
 }
 
-/// How many trials it takes until a fraction near ½ is known to ± `half_width`: z² / 4w², to the nearest whole number, 384
-/// for ±5 points. (Wilson's interval, a little narrower, is within it there.)
+/// Returns the number of trials for a half-width of the 95 % interval of a fraction near ½: z² / 4w², rounded; 384 for
+/// ±5 points. Wilson's interval is slightly narrower.
 #[must_use]
 pub fn trials_for(half_width: f64) -> u64 {
     let exact = Z_95 * Z_95 / (4.0 * half_width * half_width);
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive number; saturates")]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive; saturates")]
     let whole = (exact + 0.5) as u64;
     whole
 }
 
-/// Mean of one number a subject, and its interval of 95 % over subjects by Student's t; the paper states it of sensitivity.
-/// Nothing of fewer than two subjects.
+/// Returns the mean over subjects and Student's 95 % interval, as the paper for sensitivity; `None` for fewer than two
+/// subjects.
 pub(crate) fn mean_over_subjects(values: &[f64]) -> Option<(f64, Interval)> {
     let n = values.len() as f64;
     if values.len() < 2 {
@@ -189,31 +191,31 @@ pub(crate) fn mean_over_subjects(values: &[f64]) -> Option<(f64, Interval)> {
     Some((mean, Interval { low: mean - half, high: mean + half }))
 }
 
-/// Standard normal deviate that a two-sided interval of 95 % reaches to: Φ⁻¹(.975).
+/// Standard normal deviate of a two-sided 95 % interval: Φ⁻¹(.975).
 const Z_95: f64 = 1.959_963_984_540_054;
 
-/// Halvings of a bracket, after which it is as narrow as two numbers can be.
+/// Bisections of a bracket until it is as narrow as floating point allows.
 const HALVINGS: u32 = 200;
 
-/// Farther out than any deviate that is asked for: corrected rates of a million trials lie within 6.
-const FARTHEST: f64 = 1e4;
+/// Bound of all deviates; those of corrected rates of a million trials are below 6.
+const MAX_DEVIATE: f64 = 1e4;
 
 /// φ(x), the density.
 fn density(x: f64) -> f64 {
     libm::exp(-0.5 * x * x) / (2.0 * PI).sqrt()
 }
 
-/// Φ(x), the probability of less than x.
+/// Φ(x), the cumulative probability.
 fn probability(x: f64) -> f64 {
     0.5 * libm::erfc(-x / SQRT_2)
 }
 
-/// Φ⁻¹(p): the deviate that a fraction `p`, 0 to 1, lies below.
+/// Φ⁻¹(p), the quantile of `p`, 0 to 1.
 fn deviate(p: f64) -> f64 {
     inverse(probability, p)
 }
 
-/// The deviate of Student's t with `freedom` degrees that a fraction `p` lies below.
+/// The quantile of Student's t with `freedom` degrees of freedom.
 fn student(p: f64, freedom: u64) -> f64 {
     inverse(|t| 0.5 * (1.0 + within(t, freedom)), p)
 }
@@ -225,7 +227,7 @@ fn within(t: f64, freedom: u64) -> f64 {
     let sine = ratio * cosine;
     let (mut term, mut sum) = (1.0, 0.0);
     let odd = freedom % 2 == 1;
-    // Of odd degrees the terms are cos, 2/3 cos³, …; of even ones 1, 1/2 cos², ….
+    // Terms for odd degrees: cos, 2/3 cos³, …; for even degrees: 1, 1/2 cos², ….
     let first = if odd { 1 } else { 0 };
     for power in (first..freedom.saturating_sub(1)).step_by(2) {
         sum += term;
@@ -234,12 +236,12 @@ fn within(t: f64, freedom: u64) -> f64 {
     if odd { FRAC_2_PI * (libm::atan(ratio) + sine * cosine * sum) } else { sine * sum }
 }
 
-/// Where an increasing function reaches a value, by halving.
+/// Inverts an increasing function by bisection.
 fn inverse(function: impl Fn(f64) -> f64, value: f64) -> f64 {
-    let (mut low, mut high) = (-FARTHEST, FARTHEST);
+    let (mut low, mut high) = (-MAX_DEVIATE, MAX_DEVIATE);
     for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        if function(middle) < value { low = middle } else { high = middle }
+        let centre = 0.5 * (low + high);
+        if function(centre) < value { low = centre } else { high = centre }
     }
     0.5 * (low + high)
 }
@@ -249,7 +251,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn deviates_are_those_of_the_tables() {
+    fn quantiles_equal_published_tables() {
         for (p, z) in [(0.975, Z_95), (0.5, 0.0), (0.841_344_746_068_542_9, 1.0), (1e-6, -4.753_424_308_822_899)] {
             assert!((deviate(p) - z).abs() < 1e-9, "{p}: {}", deviate(p));
         }
@@ -261,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn deviates_turn_probabilities_round() {
+    fn quantiles_invert_probabilities() {
         for k in 1..200 {
             let p = f64::from(k) / 200.0;
             assert!((probability(deviate(p)) - p).abs() < 1e-14);
@@ -289,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn the_paper_s_six_subjects_come_out_as_printed() {
+    fn the_six_subjects_of_the_paper_are_reproduced() {
         for (subject, (_, [sensitivity, specificity])) in TABLE_1.iter().enumerate().take(6) {
             let counts = row(subject);
             assert_eq!(counts.trials(), 118);
@@ -299,19 +301,19 @@ mod tests {
     }
 
     #[test]
-    fn the_paper_s_random_row_is_misprinted() {
+    fn the_random_row_of_the_paper_is_misprinted() {
         // Its counts give .59 and .44; .54 and .48 are printed.
         let counts = row(6);
         assert_eq!(counts.trials(), 118);
         assert_eq!(rounded(counts.sensitivity().value().unwrap(), 100.0), 0.59);
         assert_eq!(rounded(counts.specificity().value().unwrap(), 100.0), 0.44);
-        // What is printed are the predictive values of the same counts.
+        // The printed values are the predictive values of these counts.
         assert_eq!(rounded(37.0 / (37.0 + 31.0), 100.0), 0.54);
         assert_eq!(rounded(24.0 / (24.0 + 26.0), 100.0), 0.48);
     }
 
     #[test]
-    fn the_paper_s_mean_sensitivity_and_its_interval() {
+    fn the_mean_sensitivity_of_the_paper_and_its_interval_are_reproduced() {
         // "Mean: 0.7667, 95% confidence interval [0.671, 0.863]", of the printed numbers.
         let printed = TABLE_1[..6].iter().map(|(_, [sensitivity, _])| *sensitivity).collect::<Vec<_>>();
         let (mean, Interval { low, high }) = mean_over_subjects(&printed).unwrap();
@@ -320,11 +322,11 @@ mod tests {
     }
 
     #[test]
-    fn wilson_solves_its_own_equation() {
-        // Its ends are the p with |p̂ − p| = z √(p(1−p)/n).
+    fn wilson_intervals_solve_their_equation() {
+        // The ends are the p with |p̂ − p| = z √(p(1−p)/n).
         for of in [1, 2, 7, 118, 5000] {
             for hits in (0..=of).step_by(1 + usize::try_from(of / 9).unwrap()) {
-                let proportion = Proportion { hits, of };
+                let proportion = Proportion { hits, total: of };
                 let (value, Interval { low, high }) = (proportion.value().unwrap(), proportion.wilson());
                 assert!(0.0 <= low && low <= value && value <= high && high <= 1.0);
                 for end in [low, high] {
@@ -340,20 +342,20 @@ mod tests {
     #[test]
     fn d_prime_and_criterion() {
         let detect = |tp, fp, tn, fn_, task| Counts { tp, fp, tn, fn_ }.detection(task);
-        // Worked by hand: H = 35.5/53, F = 29.5/67.
-        let first = row(0).detection(Task::YesNo);
+        // Computed by hand: H = 35.5/53, F = 29.5/67.
+        let first = row(0).detection(TrialDesign::YesNo);
         let (z_hits, z_alarms) = (deviate(35.5 / 53.0), deviate(29.5 / 67.0));
         assert!((first.d_prime - (z_hits - z_alarms)).abs() < 1e-12);
         assert!((first.d_prime - 0.589).abs() < 1e-3 && (first.criterion + 0.144).abs() < 1e-3, "{first:?}");
-        // Chance is 0; perfect is finite; a yes-sayer has a criterion below 0.
-        assert!(detect(30, 30, 30, 30, Task::YesNo).d_prime.abs() < 1e-12);
-        let perfect = detect(59, 0, 59, 0, Task::YesNo);
+        // d′ is 0 at chance and finite for perfect answers; a bias to "real" gives a criterion below 0.
+        assert!(detect(30, 30, 30, 30, TrialDesign::YesNo).d_prime.abs() < 1e-12);
+        let perfect = detect(59, 0, 59, 0, TrialDesign::YesNo);
         assert!(perfect.d_prime.is_finite() && perfect.d_prime > 4.0 && perfect.criterion.abs() < 1e-12);
-        assert!(detect(59, 59, 0, 0, Task::YesNo).criterion < -2.0);
-        assert!(detect(0, 0, 0, 0, Task::YesNo).d_prime == 0.0);
-        // Two alternatives are easier by √2, so that the same counts mean less.
-        let two = detect(50, 16, 38, 14, Task::TwoAlternatives).d_prime;
-        let one = detect(50, 16, 38, 14, Task::YesNo).d_prime;
+        assert!(detect(59, 59, 0, 0, TrialDesign::YesNo).criterion < -2.0);
+        assert!(detect(0, 0, 0, 0, TrialDesign::YesNo).d_prime == 0.0);
+        // Two alternatives are easier by √2: the same counts give a smaller d′.
+        let two = detect(50, 16, 38, 14, TrialDesign::TwoAlternatives).d_prime;
+        let one = detect(50, 16, 38, 14, TrialDesign::YesNo).d_prime;
         assert!((one / two - SQRT_2).abs() < 1e-12);
     }
 
@@ -361,7 +363,7 @@ mod tests {
     fn the_interval_of_d_prime_covers() {
         use portable_numerics::random::uniform;
         use rand_core::SeedableRng;
-        // Observers of a known d′ = 1: 95 % of 2000 intervals, within 4 standard errors.
+        // Simulated observers with d′ = 1: 95 % of 2000 intervals contain it, within 4 standard errors.
         let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(11);
         let [real, synthetic] = [0.691_462_461, 0.308_537_539];
         let (mut covered, runs) = (0, 2000);
@@ -372,7 +374,7 @@ mod tests {
                 let u = uniform(&mut rng);
                 counts.count(is_real, u < if is_real { real } else { synthetic });
             }
-            let Interval { low, high } = counts.detection(Task::YesNo).d_prime_interval;
+            let Interval { low, high } = counts.detection(TrialDesign::YesNo).d_prime_interval;
             covered += i32::from(low <= 1.0 && 1.0 <= high);
         }
         let error = (0.95_f64 * 0.05 / f64::from(runs)).sqrt();
@@ -380,10 +382,10 @@ mod tests {
     }
 
     #[test]
-    fn a_claim_of_five_points_takes_384_trials() {
-        assert_eq!(trials_for(CLAIM_HALF_WIDTH), 384);
-        let Interval { low, high } = Proportion { hits: 192, of: 384 }.wilson();
-        assert!(high - low <= 2.0 * CLAIM_HALF_WIDTH);
+    fn a_half_width_of_five_points_needs_384_trials() {
+        assert_eq!(trials_for(DEFAULT_HALF_WIDTH), 384);
+        let Interval { low, high } = Proportion { hits: 192, total: 384 }.wilson();
+        assert!(high - low <= 2.0 * DEFAULT_HALF_WIDTH);
         assert!(trials_for(0.0) == u64::MAX);
     }
 }

@@ -1,4 +1,4 @@
-//! A subject's way through a study: what is shown next, what was answered, all of it on the disk.
+//! The session of a subject: trials and answers, saved on the disk.
 
 use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
@@ -6,83 +6,83 @@ use std::path::{Path, PathBuf};
 use papsynth_dataset::write_file;
 use serde::Serialize;
 
-use crate::design::{Answer, Side, Stage, StudyParams, Task};
+use crate::design::{Answer, Side, Stage, StudyParams, TrialDesign};
 use crate::error::Error;
 use crate::fields::Root;
 use crate::key::Key;
 use crate::plan::{Folders, Plan};
 use crate::results::Summary;
-use crate::saved::{Answered, Exposure, STATE, Saved, UnderWay, is_time};
+use crate::saved::{Answered, CurrentTrial, Exposure, STATE, Saved, is_time};
 use crate::table::trials_csv;
 
 const TRIALS: &str = "trials.csv";
 const SUMMARY: &str = "summary.json";
 const LOCK: &str = ".lock";
 
-/// Why something that a page sent is not taken.
+/// An error of a request of the page.
 #[derive(Debug)]
-pub enum Refusal {
-    /// It does not fit what is asked now: another page has gone on, or the answer arrived already.
+pub enum SessionError {
+    /// The request is for another trial: another page has continued, or the answer was already received.
     Stale,
-    /// It is nothing that a page of ours sends.
-    Nonsense,
-    /// It could not be written down, so it does not count.
+    /// The content of the request is invalid.
+    Invalid,
+    /// The state could not be saved; the request has no effect.
     NotWritten(Error),
 }
 
-impl From<Error> for Refusal {
+impl From<Error> for SessionError {
     fn from(error: Error) -> Self {
         Self::NotWritten(error)
     }
 }
 
-/// What a page has to know to go on; nothing in it depends on what is real.
+/// The state for the page. It is independent of which patches are real.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct State {
-    /// What is asked.
-    pub task: Task,
-    /// Whether the next trial counts; the last one's, if there is none.
+    /// Design of the trials.
+    pub task: TrialDesign,
+    /// Stage of the next trial; of the last trial if all are answered.
     pub stage: Stage,
-    /// The number of the next trial in its stage, from 1.
+    /// Number of the next trial in its stage, from 1.
     pub number: usize,
-    /// The number of trials in that stage.
+    /// Number of trials in that stage.
     pub of: usize,
-    /// What the patches of the next trial are asked for by, from left to right.
+    /// Names of the patches of the next trial, from left to right.
     pub patches: Vec<String>,
-    /// Whether they have been seen, so that only the answer is missing.
+    /// Whether they were shown, so that only the answer is missing.
     pub shown: bool,
-    /// How long they are to be shown, ms.
+    /// Specified exposure, ms.
     pub exposure_ms: u32,
-    /// Their side, pixels.
+    /// Size of a patch, px.
     pub patch_px: usize,
-    /// Trials for practice.
+    /// Number of practice trials.
     pub training: usize,
-    /// Trials that count.
+    /// Number of counted trials.
     pub trials: usize,
-    /// Trials that were answered, those for practice among them.
+    /// Number of answered trials, including practice trials.
     pub answered: usize,
-    /// Whether there is nothing left to answer.
+    /// Whether all trials are answered.
     pub finished: bool,
 }
 
-/// A subject's way through a study.
+/// The session of a subject.
 #[derive(Debug)]
 pub struct Session {
     folder: PathBuf,
     saved: Saved,
     key: Key,
-    /// PNG files, for each trial one or two.
+    /// PNG files, one or two for each trial.
     patches: Vec<Vec<Vec<u8>>>,
-    /// Held as long as this lives, so that no second program writes to the folder.
+    /// Lock against a second program that writes to the folder.
     _lock: File,
 }
 
 impl Session {
-    /// Begins the study of `params.subject` in a folder of that name in `out`, or goes on with it.
+    /// Starts or continues the study of `params.subject` in a folder of that name in `out`.
     ///
     /// # Errors
-    /// If a parameter is out of range, the folders hold too little or are not readable, a study of other parameters or fields
-    /// was begun under that name, another program is at it, or the system refuses to write.
+    /// If a parameter is out of range, the folders have too few patches or cannot be read, the existing study has other
+    /// parameters or fields, another program uses it, or a file cannot be written.
     pub fn open(params: &StudyParams, real: &Path, synthetic: &Path, out: &Path) -> Result<Self, Error> {
         params.check()?;
         let folders = Folders::new(real, synthetic)?;
@@ -90,13 +90,13 @@ impl Session {
         let path = folder.join(STATE);
         let (saved, is_new) = if path.exists() {
             let saved = Saved::read(&path)?;
-            same(params, &saved.params, &path)?;
+            check_params(params, &saved.params, &path)?;
             (saved, false)
         } else {
             (Saved::new(params, Plan::draw(params, &folders)?), true)
         };
         let patches = saved.plan.patches(params, &folders)?;
-        // Nothing is written before everything has been read.
+        // No file is written before all inputs are read.
         let lock = lock(out, &folder)?;
         let key = saved.plan.key(params);
         let session = Self { folder, saved, key, patches, _lock: lock };
@@ -108,10 +108,10 @@ impl Session {
         Ok(session)
     }
 
-    /// What a page has to know.
+    /// Returns the state for the page.
     #[must_use]
     pub fn state(&self) -> State {
-        let Saved { params, plan, answers, under_way, .. } = &self.saved;
+        let Saved { params, plan, answers, current, .. } = &self.saved;
         let answered = answers.len();
         let finished = self.is_finished();
         let (stage, number, of) = match answered.min(plan.trials.len().saturating_sub(1)) {
@@ -125,7 +125,7 @@ impl Session {
             number,
             of,
             patches: (0..slots).map(|slot| plan.patch_name(&self.key, answered, slot)).collect(),
-            shown: under_way.exposure.is_some(),
+            shown: current.exposure.is_some(),
             exposure_ms: params.exposure_ms,
             patch_px: params.patch_px,
             training: params.training,
@@ -135,46 +135,46 @@ impl Session {
         }
     }
 
-    /// Whether everything has been answered.
+    /// Whether all trials are answered.
     #[must_use]
     pub fn is_finished(&self) -> bool {
         self.saved.is_finished()
     }
 
-    /// What came out, or would if it ended now.
+    /// Returns the results of the answers so far.
     #[must_use]
     pub fn summary(&self) -> Summary {
         Summary::of(&self.saved)
     }
 
-    /// Where the results lie.
+    /// The folder of the results.
     #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// What whoever reads the results should know.
+    /// Notes for the results.
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.saved.plan.notes
     }
 
-    /// Number of fields of one side.
+    /// Number of real or synthetic fields.
     #[must_use]
     pub fn fields(&self, side: Side) -> usize {
         self.saved.plan.fields.iter().filter(|field| field.side == side).count()
     }
 
-    /// The port that the page was last served at, or 0.
+    /// Last port of the page, or 0.
     #[must_use]
     pub fn port(&self) -> u16 {
         self.saved.port
     }
 
-    /// Keeps the port that the page is served at.
+    /// Saves the port of the page.
     ///
     /// # Errors
-    /// If the system refuses to write.
+    /// If the state cannot be saved.
     pub fn set_port(&mut self, port: u16) -> Result<(), Error> {
         if self.saved.port != port {
             self.change(|saved| saved.port = port)?;
@@ -182,66 +182,66 @@ impl Session {
         Ok(())
     }
 
-    /// A patch of the trial under way, as a PNG file, if it has not been seen yet. Asking for the first one counts as a showing.
+    /// Returns a patch of the current trial as a PNG file. Requests of the first patch are counted as showings.
     ///
     /// # Errors
-    /// If no patch of that name is asked for now, or the showing could not be written down.
-    pub fn patch(&mut self, name: &str) -> Result<&[u8], Refusal> {
+    /// If the current trial has no such patch, it was already shown, or the state cannot be saved.
+    pub fn patch(&mut self, name: &str) -> Result<&[u8], SessionError> {
         let trial = self.saved.answers.len();
         let slots = self.patches.get(trial).map_or(0, Vec::len);
         let slot = (0..slots).find(|&slot| self.saved.plan.patch_name(&self.key, trial, slot) == name);
-        let slot = slot.filter(|_| self.saved.under_way.exposure.is_none()).ok_or(Refusal::Stale)?;
+        let slot = slot.filter(|_| self.saved.current.exposure.is_none()).ok_or(SessionError::Stale)?;
         if slot == 0 {
-            self.change(|saved| saved.under_way.showings = saved.under_way.showings.saturating_add(1))?;
+            self.change(|saved| saved.current.showings = saved.current.showings.saturating_add(1))?;
         }
         Ok(&self.patches[trial][slot])
     }
 
-    /// The patches of the trial under way were seen. What arrives twice counts once.
+    /// Records that the patches of the current trial were shown. A second call has no effect.
     ///
     /// # Errors
-    /// If it is not what is asked now, makes no sense, or could not be written down.
-    pub fn shown(&mut self, name: &str, exposure: Exposure) -> Result<(), Refusal> {
-        if !exposure.is_sound() {
-            return Err(Refusal::Nonsense);
+    /// If the name is not that of the current trial, a value is invalid, or the state cannot be saved.
+    pub fn shown(&mut self, name: &str, exposure: Exposure) -> Result<(), SessionError> {
+        if !exposure.is_valid() {
+            return Err(SessionError::Invalid);
         }
         self.expect(name)?;
-        if self.saved.under_way.exposure.is_none() {
-            self.change(|saved| saved.under_way.exposure = Some(exposure))?;
+        if self.saved.current.exposure.is_none() {
+            self.change(|saved| saved.current.exposure = Some(exposure))?;
         }
         Ok(())
     }
 
-    /// The answer to the trial under way, whose patches have been seen.
+    /// Records the answer to the current trial after its patches were shown.
     ///
     /// # Errors
-    /// If it is not what is asked now, makes no sense, or could not be written down.
-    pub fn answer(&mut self, name: &str, answer: Answer, response_ms: f64) -> Result<(), Refusal> {
+    /// If the name is not that of the current trial, a value is invalid, or the state cannot be saved.
+    pub fn answer(&mut self, name: &str, answer: Answer, response_ms: f64) -> Result<(), SessionError> {
         if !is_time(response_ms) || !answer.fits(self.saved.params.task) {
-            return Err(Refusal::Nonsense);
+            return Err(SessionError::Invalid);
         }
         self.expect(name)?;
-        let UnderWay { showings, exposure } = self.saved.under_way;
-        let exposure = exposure.ok_or(Refusal::Stale)?;
+        let CurrentTrial { showings, exposure } = self.saved.current;
+        let exposure = exposure.ok_or(SessionError::Stale)?;
         self.change(|saved| {
             saved.answers.push(Answered { answer, response_ms, exposure, showings });
-            saved.under_way = UnderWay::default();
+            saved.current = CurrentTrial::default();
         })?;
         if self.is_finished() {
-            // The answers are safe; results that cannot be written now are written when the study is opened again.
+            // The answers are saved; missing results are written when the study is opened again.
             self.write_results()?;
         }
         Ok(())
     }
 
-    /// Makes sure that a page speaks of the trial under way.
-    fn expect(&self, name: &str) -> Result<(), Refusal> {
+    /// Checks that a request is for the current trial.
+    fn expect(&self, name: &str) -> Result<(), SessionError> {
         let trial = self.saved.answers.len();
         let is_now = !self.is_finished() && self.saved.plan.patch_name(&self.key, trial, 0) == name;
-        if is_now { Ok(()) } else { Err(Refusal::Stale) }
+        if is_now { Ok(()) } else { Err(SessionError::Stale) }
     }
 
-    /// Changes what is kept: on the disk first, so that nothing counts that could be lost.
+    /// Changes the state after it is saved on the disk, so that no change can be lost.
     fn change(&mut self, change: impl FnOnce(&mut Saved)) -> Result<(), Error> {
         let mut next = self.saved.clone();
         change(&mut next);
@@ -263,38 +263,38 @@ impl Session {
     }
 }
 
-/// Makes sure that a study goes on as it began.
-fn same(asked: &StudyParams, begun: &StudyParams, path: &Path) -> Result<(), Error> {
-    if asked == begun {
+/// Checks that the parameters are those of the existing study.
+fn check_params(given: &StudyParams, existing: &StudyParams, path: &Path) -> Result<(), Error> {
+    if given == existing {
         return Ok(());
     }
-    let (asked, begun) = (serde_json::json!(asked), serde_json::json!(begun));
-    let asked = asked.as_object().into_iter().flatten();
-    let differing = asked.filter(|(name, value)| begun[name.as_str()] != **value);
-    let differing = differing.map(|(name, value)| format!("{name} was {} and is {value} now", begun[name.as_str()]));
+    let (given, existing) = (serde_json::json!(given), serde_json::json!(existing));
+    let given = given.as_object().into_iter().flatten();
+    let differing = given.filter(|(name, value)| existing[name.as_str()] != **value);
+    let differing = differing.map(|(name, value)| format!("{name} is {value}, expected {}", existing[name.as_str()]));
     let message = format!(
-        "this study was begun otherwise: {}; the same options go on with it, another subject or folder begins a new one",
+        "the existing study has other parameters: {}; use the same options to continue it, or another subject or folder",
         differing.collect::<Vec<_>>().join(", ")
     );
     Err(Error::folder(path, message))
 }
 
-/// Makes the folder of a subject and takes it for this program.
+/// Creates and locks the folder of a subject.
 fn lock(out: &Path, folder: &Path) -> Result<File, Error> {
     fs::create_dir_all(folder).map_err(Error::io("write", folder))?;
-    // The name of a subject holds no separator, but it may be a link.
+    // The folder may be a symbolic link.
     Root::new(out)?.inside(folder)?;
     let path = folder.join(LOCK);
     if fs::symlink_metadata(&path).is_ok_and(|found| !found.is_file()) {
-        return Err(Error::folder(&path, "is no file; a file or nothing is expected"));
+        return Err(Error::folder(&path, "not a regular file; remove it"));
     }
     let file = File::options().write(true).create(true).truncate(false).open(&path);
     let file = file.map_err(Error::io("write", &path))?;
     match file.try_lock() {
         Err(TryLockError::WouldBlock) => {
-            Err(Error::folder(folder, "another program is at the study of this subject; end that one first"))
+            Err(Error::folder(folder, "another program uses the study of this subject; close it first"))
         }
-        // File systems without locks do without.
+        // File systems without locks skip this protection.
         Ok(()) | Err(TryLockError::Error(_)) => Ok(file),
     }
 }
@@ -320,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn a_study_goes_on_where_it_was_whenever_it_is_opened() {
+    fn a_reopened_study_continues_at_the_current_trial() {
         let scratch = bench("session");
         for trial in 0..8 {
             let mut session = open(&scratch, &params()).unwrap();
@@ -335,8 +335,8 @@ mod tests {
         assert!(session.state().finished && session.state().patches.is_empty());
         let counts = session.summary().row.counts;
         assert_eq!((counts.tp, counts.fp, counts.tn, counts.fn_), (3, 3, 0, 0));
-        assert!(matches!(session.shown("", EXPOSURE), Err(Refusal::Stale)));
-        // Results that are lost are written again.
+        assert!(matches!(session.shown("", EXPOSURE), Err(SessionError::Stale)));
+        // Missing results are written again.
         drop(session);
         let files = [TRIALS, SUMMARY].map(|name| scratch.join("out/1").join(name));
         let before = files.each_ref().map(|path| fs::read(path).unwrap());
@@ -346,47 +346,50 @@ mod tests {
     }
 
     #[test]
-    fn a_patch_is_seen_once() {
+    fn a_patch_is_shown_once() {
         let scratch = bench("session-once");
         let mut session = open(&scratch, &params()).unwrap();
         let name = session.state().patches[0].clone();
-        assert!(matches!(session.answer(&name, Answer::Real, 1.0), Err(Refusal::Stale)), "not seen yet");
-        // Loaded again before it had been seen to its end, then seen.
+        assert!(matches!(session.answer(&name, Answer::Real, 1.0), Err(SessionError::Stale)), "not shown yet");
+        // Reloaded during the exposure, then shown.
         session.patch(&name).unwrap();
         drop(session);
         let mut session = open(&scratch, &params()).unwrap();
         session.patch(&name).unwrap();
         session.shown(&name, EXPOSURE).unwrap();
-        assert!(matches!(session.patch(&name), Err(Refusal::Stale)));
-        // Said twice; the first counts.
+        assert!(matches!(session.patch(&name), Err(SessionError::Stale)));
+        // The first of two reports counts.
         session.shown(&name, Exposure { exposure_ms: 1.0, ..EXPOSURE }).unwrap();
         drop(session);
         let mut session = open(&scratch, &params()).unwrap();
         assert!(session.state().shown);
         session.answer(&name, Answer::Synthetic, 700.0).unwrap();
-        assert!(matches!(session.answer(&name, Answer::Real, 1.0), Err(Refusal::Stale)), "arrived already");
+        assert!(matches!(session.answer(&name, Answer::Real, 1.0), Err(SessionError::Stale)), "already received");
         let answered = session.saved.answers[0];
         assert_eq!((answered.showings, answered.exposure, answered.answer), (2, EXPOSURE, Answer::Synthetic));
     }
 
     #[test]
-    fn nonsense_is_refused_and_changes_nothing() {
+    fn invalid_requests_are_refused_and_change_nothing() {
         let scratch = bench("session-nonsense");
         let mut session = open(&scratch, &params()).unwrap();
         let name = session.state().patches[0].clone();
         for bad in [f64::NAN, -1.0, f64::INFINITY] {
-            assert!(matches!(session.shown(&name, Exposure { exposure_ms: bad, ..EXPOSURE }), Err(Refusal::Nonsense)));
+            assert!(matches!(
+                session.shown(&name, Exposure { exposure_ms: bad, ..EXPOSURE }),
+                Err(SessionError::Invalid)
+            ));
         }
         session.shown(&name, EXPOSURE).unwrap();
-        assert!(matches!(session.answer(&name, Answer::Left, 1.0), Err(Refusal::Nonsense)));
-        assert!(matches!(session.answer(&name, Answer::Real, f64::NAN), Err(Refusal::Nonsense)));
-        assert!(matches!(session.answer("", Answer::Real, 1.0), Err(Refusal::Stale)));
-        assert!(matches!(session.patch("../session.json"), Err(Refusal::Stale)));
+        assert!(matches!(session.answer(&name, Answer::Left, 1.0), Err(SessionError::Invalid)));
+        assert!(matches!(session.answer(&name, Answer::Real, f64::NAN), Err(SessionError::Invalid)));
+        assert!(matches!(session.answer("", Answer::Real, 1.0), Err(SessionError::Stale)));
+        assert!(matches!(session.patch("../session.json"), Err(SessionError::Stale)));
         assert_eq!(session.state().answered, 0);
     }
 
     #[test]
-    fn two_programs_do_not_share_a_subject_and_other_options_are_refused() {
+    fn a_second_program_and_other_options_are_refused() {
         let scratch = bench("session-lock");
         let session = open(&scratch, &params()).unwrap();
         assert!(open(&scratch, &params()).unwrap_err().to_string().contains("another program"));
@@ -394,7 +397,7 @@ mod tests {
         open(&scratch, &other).unwrap();
         drop(session);
         let error = open(&scratch, &StudyParams { trials: 8, seed: 1, ..params() }).unwrap_err().to_string();
-        assert!(error.contains("seed was 0 and is 1 now, trials was 6 and is 8 now"), "{error}");
+        assert!(error.contains("seed is 1, expected 0, trials is 8, expected 6"), "{error}");
         assert_eq!(read_all(&scratch.join("out")).unwrap().len(), 2);
     }
 
@@ -418,12 +421,12 @@ mod tests {
             assert_ne!(bad, good, "{from}");
             fs::write(&path, bad).unwrap();
             let error = open(&scratch, &params()).unwrap_err();
-            assert!(error.to_string().contains("session.json: is no state of a study"), "{from}: {error}");
+            assert!(error.to_string().contains("session.json: not a valid state of a study"), "{from}: {error}");
         }
-        // A place outside the field.
+        // A position outside the field.
         let far = good.replacen("\"x_px\":", "\"x_px\":1844674407370955", 1);
         fs::write(&path, far).unwrap();
-        assert!(open(&scratch, &params()).unwrap_err().to_string().contains("has changed since"));
+        assert!(open(&scratch, &params()).unwrap_err().to_string().contains("was changed after"));
         for cut in (0..good.len()).step_by(good.len() / 50) {
             fs::write(&path, &good[..cut]).unwrap();
             assert!(open(&scratch, &params()).is_err());
@@ -431,16 +434,16 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_written_does_not_count() {
+    fn answers_that_cannot_be_saved_do_not_count() {
         let scratch = bench("session-full");
         let mut session = open(&scratch, &params()).unwrap();
         let name = session.state().patches[0].clone();
         session.shown(&name, EXPOSURE).unwrap();
-        // No file can be put in the place of a folder.
+        // A file cannot replace a folder that is not empty.
         let path = scratch.join("out/1/session.json");
         fs::remove_file(&path).unwrap();
         fs::create_dir_all(path.join("in the way")).unwrap();
-        assert!(matches!(session.answer(&name, Answer::Real, 1.0), Err(Refusal::NotWritten(_))));
+        assert!(matches!(session.answer(&name, Answer::Real, 1.0), Err(SessionError::NotWritten(_))));
         assert_eq!(session.state().answered, 0);
         fs::remove_dir_all(&path).unwrap();
         session.answer(&name, Answer::Real, 1.0).unwrap();
@@ -449,12 +452,12 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn results_do_not_follow_links_out_of_their_folder() {
+    fn results_do_not_follow_links_outside_their_folder() {
         let scratch = bench("session-link");
         fs::create_dir_all(scratch.join("elsewhere")).unwrap();
         fs::create_dir_all(scratch.join("out")).unwrap();
         std::os::unix::fs::symlink(scratch.join("elsewhere"), scratch.join("out/1")).unwrap();
-        assert!(open(&scratch, &params()).unwrap_err().to_string().contains("leads out of"));
+        assert!(open(&scratch, &params()).unwrap_err().to_string().contains("outside"));
         assert_eq!(fs::read_dir(scratch.join("elsewhere")).unwrap().count(), 0);
     }
 }

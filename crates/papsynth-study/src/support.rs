@@ -1,4 +1,4 @@
-//! Pictures to test with.
+//! Images for tests.
 
 use std::fs;
 use std::ops::Deref;
@@ -11,7 +11,7 @@ use crate::plan::Folders;
 use crate::saved::Exposure;
 use crate::session::Session;
 
-/// A folder of this test alone, removed at its end.
+/// A temporary folder of one test.
 pub(crate) struct Scratch(PathBuf);
 
 impl Scratch {
@@ -37,12 +37,12 @@ impl Drop for Scratch {
     }
 }
 
-/// A PNG of 8 bits, in a folder that is made.
-pub(crate) fn picture(path: &Path, number: u32, side: [u32; 2]) {
+/// Writes an 8-bit PNG file and creates its folder.
+pub(crate) fn write_image(path: &Path, number: u32, side: [u32; 2]) {
     exposed(path, number, side, 230, 8);
 }
 
-/// Glass of one level with dark discs on it, at places that depend on the number.
+/// Writes an image of glass with dark discs at positions that depend on the number.
 pub(crate) fn exposed(path: &Path, number: u32, [width, height]: [u32; 2], glass: u32, bits: u32) {
     let disc = |x: u32, y: u32| {
         let (dx, dy) = ((x + 17 * number) % 60, (y + 29 * number) % 60);
@@ -55,7 +55,7 @@ pub(crate) fn exposed(path: &Path, number: u32, [width, height]: [u32; 2], glass
     write_png(path, &levels, width as usize, 1, bits, 0.25).unwrap();
 }
 
-/// Folders `real`, whose fields are exposed darker, and `synthetic`.
+/// Writes the folders `real`, with darker exposure, and `synthetic`.
 pub(crate) fn study_folders(scratch: &Scratch, real: u32, synthetic: u32) -> Folders {
     for (side, count, glass, first) in [("real", real, 200, 0), ("synthetic", synthetic, 230, 100)] {
         for k in 0..count {
@@ -68,7 +68,7 @@ pub(crate) fn study_folders(scratch: &Scratch, real: u32, synthetic: u32) -> Fol
 pub(crate) const EXPOSURE: Exposure =
     Exposure { exposure_ms: 2000.0, frames: 120, longest_frame_ms: 16.7, pixel_ratio: 1.0 };
 
-/// Answers the trial under way.
+/// Answers the current trial.
 pub(crate) fn go_on(session: &mut Session, answer: Answer) {
     let name = session.state().patches[0].clone();
     session.patch(&name).unwrap();

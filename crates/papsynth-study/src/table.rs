@@ -1,16 +1,16 @@
-//! Results as tables: every trial for other programs, rows and groups for a terminal.
+//! Tables of results: trials as CSV, rows and groups as text.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use crate::breakdown::{FIELD, Group};
-use crate::design::{Side, Task};
+use crate::design::{Side, TrialDesign};
 use crate::parameters::Value;
 use crate::results::Row;
 use crate::saved::{Answered, Saved};
 use crate::score::{Counts, Interval, Proportion};
 
-/// Every trial that was answered, as a table; nothing if none was.
+/// Returns all answered trials as CSV; empty if there are none.
 pub(crate) fn trials_csv(saved: &Saved) -> Vec<u8> {
     let names: BTreeSet<&String> =
         saved.plan.trials.iter().flat_map(|trial| &trial.patches).flat_map(|patch| patch.parameters.keys()).collect();
@@ -18,10 +18,10 @@ pub(crate) fn trials_csv(saved: &Saved) -> Vec<u8> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for (number, one) in saved.answered().enumerate() {
         let truth = match (params.task, one.is_positive()) {
-            (Task::YesNo, true) => "real",
-            (Task::YesNo, false) => "synthetic",
-            (Task::TwoAlternatives, true) => "left",
-            (Task::TwoAlternatives, false) => "right",
+            (TrialDesign::YesNo, true) => "real",
+            (TrialDesign::YesNo, false) => "synthetic",
+            (TrialDesign::TwoAlternatives, true) => "left",
+            (TrialDesign::TwoAlternatives, false) => "right",
         };
         let Answered { answer, response_ms, exposure, showings } = one.answered;
         let mut line: Vec<(&str, String)> = vec![
@@ -58,12 +58,12 @@ pub(crate) fn trials_csv(saved: &Saved) -> Vec<u8> {
         let (head, line): (Vec<&str>, Vec<String>) = line.into_iter().unzip();
         let written = if number == 0 { writer.write_record(head) } else { Ok(()) };
         let written = written.and_then(|()| writer.write_record(line));
-        debug_assert!(written.is_ok(), "memory takes every byte, and all lines are of one length: {written:?}");
+        debug_assert!(written.is_ok(), "all lines have the same length: {written:?}");
     }
     writer.into_inner().unwrap_or_default()
 }
 
-/// Rows as a table for a terminal, with the intervals of 95 % below their numbers' names.
+/// Formats rows as a text table with 95 % intervals.
 #[must_use]
 pub fn table<'a>(rows: impl IntoIterator<Item = &'a Row>) -> String {
     let rows: Vec<&Row> = rows.into_iter().collect();
@@ -77,7 +77,7 @@ pub fn table<'a>(rows: impl IntoIterator<Item = &'a Row>) -> String {
     );
     for row in rows {
         let Row { subject, counts: Counts { tp, fp, tn, fn_ }, detection, .. } = row;
-        // No minus before 0.00.
+        // Avoids -0.00.
         let [d_prime, criterion] = [detection.d_prime, detection.criterion].map(|number| number + 0.0);
         let [sensitivity, specificity, accuracy] =
             [row.sensitivity, row.specificity, row.accuracy].map(|proportion| fraction(&proportion));
@@ -89,7 +89,7 @@ pub fn table<'a>(rows: impl IntoIterator<Item = &'a Row>) -> String {
     out
 }
 
-/// A fraction with its interval, such as `.681 (.646–.714)`.
+/// Formats a fraction with its interval: `.681 (.646–.714)`.
 fn fraction(proportion: &Proportion) -> String {
     let Interval { low, high } = proportion.wilson();
     match proportion.value() {
@@ -98,13 +98,13 @@ fn fraction(proportion: &Proportion) -> String {
     }
 }
 
-/// Three digits, without the zero that a fraction below 1 begins with.
+/// Formats three decimals without a leading zero.
 fn three(value: f64) -> String {
     let text = format!("{value:.3}");
     text.strip_prefix('0').unwrap_or(&text).to_owned()
 }
 
-/// The breakdown by parameter as a table for a terminal, without that by field.
+/// Formats the breakdown by parameter, without that by field, as a text table.
 #[must_use]
 pub fn breakdown_table(groups: &[Group]) -> String {
     let shown: Vec<&Group> = groups.iter().filter(|group| group.parameter != FIELD).collect();
@@ -115,8 +115,8 @@ pub fn breakdown_table(groups: &[Group]) -> String {
     for group in shown {
         let parameter = if group.parameter == before { "" } else { &group.parameter };
         before = &group.parameter;
-        let (Proportion { hits, of }, shown) = (group.correct, fraction(&group.correct));
-        let _ = writeln!(out, "{parameter:<name$}  {:<value$}  {hits:>4} of {of:<4}  {shown}", group.value);
+        let (Proportion { hits, total }, shown) = (group.correct, fraction(&group.correct));
+        let _ = writeln!(out, "{parameter:<name$}  {:<value$}  {hits:>4} of {total:<4}  {shown}", group.value);
     }
     out
 }
@@ -127,11 +127,11 @@ mod tests {
     use crate::breakdown::short;
 
     #[test]
-    fn tables_show_the_numbers_as_papers_do() {
+    fn tables_format_numbers_as_in_papers() {
         let counts = Counts { tp: 282, fp: 143, tn: 200, fn_: 83 };
-        let text = table([&Row::new("pooled", counts, Task::YesNo)]);
+        let text = table([&Row::new("pooled", counts, TrialDesign::YesNo)]);
         assert!(text.lines().nth(1).unwrap().contains(".681 (.646–.714)"), "{text}");
-        let row = Row::new("1", Counts { tp: 2, ..Counts::default() }, Task::YesNo);
+        let row = Row::new("1", Counts { tp: 2, ..Counts::default() }, TrialDesign::YesNo);
         assert!(table([&row]).contains("1.000 (.342–1.000)"));
         assert!(table([&row]).contains('–'));
         assert_eq!([0.0, 0.1234, 12.34, 1234.5].map(short), ["0", "0.123", "12.3", "1234"]);

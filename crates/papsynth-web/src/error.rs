@@ -1,23 +1,26 @@
-//! What can go wrong.
+//! The error type.
 
 use std::io;
 
-/// Why a page cannot be served.
+/// An error of the server or of a page.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The port cannot be listened at.
-    #[error("cannot listen at 127.0.0.1, port {port}: {source}; expected a port that is free, or none for any")]
+    /// The port is not available.
+    #[error("cannot listen on 127.0.0.1:{port}: {source}; choose a free port, or omit it")]
     Listen {
         /// The port.
         port: u16,
-        /// What the system said.
+        /// The system error.
         source: io::Error,
     },
-    /// A data set or slide cannot be read, or a folder holds nothing that is shown.
+    /// The system clock shows a time before 1970 or after 9999, which HTTP cannot express.
+    #[error("the system clock is outside the years 1970 to 9999; set the date")]
+    Clock,
+    /// A data set or slide cannot be read, or the folder contains neither.
     #[error(transparent)]
     Dataset(Box<papsynth_dataset::Error>),
-    /// A study cannot be kept on the disk.
+    /// A study cannot be saved.
     #[error(transparent)]
     Study(Box<papsynth_study::Error>),
 }
@@ -35,13 +38,13 @@ impl From<papsynth_study::Error> for Error {
 }
 
 impl Error {
-    /// Whether the system failed, so that trying again may help; everything else lies in what was asked for.
+    /// Whether this is an I/O error, for which a retry may help.
     #[must_use]
     pub fn is_io(&self) -> bool {
         match self {
             Self::Dataset(error) => error.is_io(),
             Self::Study(error) => error.is_io(),
-            Self::Listen { .. } => false,
+            Self::Listen { .. } | Self::Clock => false,
         }
     }
 }

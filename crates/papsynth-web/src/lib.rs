@@ -8,6 +8,6 @@ mod study;
 mod view;
 
 pub use error::Error;
-pub use server::{JSON, LONGEST_BODY, Reply, Request, Server, Site};
+pub use server::{JSON, MAX_BODY, Reply, Request, Server, Site};
 pub use study::serve_study;
-pub use view::View;
+pub use view::Viewer;

@@ -1,4 +1,4 @@
-"""Goes through the experiment in a real browser, with keyboard and mouse, and holds the results against what it did.
+"""Runs the visual study in a real browser, with keyboard and mouse, and checks the results against its answers.
 
 Usage: browser.py PAPSYNTH CHROMIUM REAL SYNTHETIC FOLDER
 
@@ -29,7 +29,7 @@ def serve_study(program, words):
 
 
 class Subject(Browser):
-    """A browser that knows the screens of a study."""
+    """A browser with the screens of a study."""
 
     def screen(self):
         return self.run("document.body?.dataset.screen")
@@ -38,7 +38,7 @@ class Subject(Browser):
         self.until(f"document.body?.dataset.screen === '{screen}'", lambda: f"the screen is {self.screen()}")
 
     def when(self, screen, script):
-        """Has the page do something the next time that it shows a screen, at once, however busy the machine is."""
+        """Runs a script in the page as soon as it shows a screen."""
         self.run(f"""new MutationObserver((_, observer) => {{
             if (document.body.dataset.screen !== '{screen}') return;
             observer.disconnect();
@@ -52,7 +52,7 @@ class Subject(Browser):
 
 
 def chunks(png):
-    """Kinds and lengths of the chunks of a PNG."""
+    """Returns the types and lengths of the chunks of a PNG."""
     at, found = 8, []
     while at < len(png):
         (length,) = struct.unpack(">I", png[at : at + 4])
@@ -62,7 +62,7 @@ def chunks(png):
 
 
 def check_secrets(browser, address, names):
-    """Nothing that was sent before the end tells what is real, and nothing came from elsewhere."""
+    """Checks that no reply before the end reveals the labels, and that nothing comes from other servers."""
     urls = browser.requests()
     assert urls and all(url.startswith((address, "data:", "about:")) for url in urls), urls
     kinds = set()
@@ -116,20 +116,20 @@ def check_results(folder, given, keys, showings, exposure_ms):
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["finished"] and summary["row"]["counts"] == counts, (summary["row"], counts)
     accuracy = summary["row"]["accuracy"]
-    assert accuracy["hits"] == counts["tp"] + counts["tn"] and accuracy["of"] == len(counted)
-    for ours, theirs in zip(wilson(accuracy["hits"], accuracy["of"]), accuracy["wilson_95"].values()):
+    assert accuracy["hits"] == counts["tp"] + counts["tn"] and accuracy["total"] == len(counted)
+    for ours, theirs in zip(wilson(accuracy["hits"], accuracy["total"]), accuracy["wilson_95"].values()):
         assert abs(ours - theirs) < 1e-9
     return summary, rows
 
 
 def yes_no(program, browser, real, synthetic, folder):
-    words = [real, synthetic, "--out", folder / "out", "--subject", "ann", "--trials", 10, "--exposure-ms", EXPOSURE_MS]
+    words = [real, synthetic, "--out", folder / "out", "--subject", "01", "--trials", 10, "--exposure-ms", EXPOSURE_MS]
     study = serve_study(program, words)
     address, given, showings = study.address, [], []
     browser.open(address)
     browser.wait("welcome")
     browser.picture(folder / "welcome.png")
-    # A key while the patch is shown is too early, and must not count.
+    # A key during the exposure must not count.
     browser.when("patch", "document.dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowLeft' }))")
     browser.press(" ")
     ways = [("press", "ArrowLeft", "real"), ("click", "#second", "synthetic"), ("press", "s", "synthetic"), ("click", "#first", "real")]
@@ -149,12 +149,12 @@ def yes_no(program, browser, real, synthetic, folder):
         if trial == 1:
             browser.picture(folder / "question.png")
         if trial == 4:
-            # Loaded anew while the question is asked: it is still asked, and the patch not shown again.
+            # Reload during the question: the question stays, and the patch is not shown again.
             browser.run("reported.then(() => true)")
             browser.reload()
             browser.wait("question")
         if trial == 2:
-            # The page is covered while the next patch is shown.
+            # Hides the page during the next exposure.
             browser.when("patch", """
                 Object.defineProperty(document, "hidden", { get: () => true, configurable: true });
                 document.dispatchEvent(new Event("visibilitychange"));
@@ -168,7 +168,7 @@ def yes_no(program, browser, real, synthetic, folder):
             browser.wait("lost")
             browser.picture(folder / "lost.png")
             study = serve_study(program, words)
-            assert study.address == address, "the open page finds its server again"
+            assert study.address == address, "the open page reconnects"
         given.append(answer)
         showings.append(again)
         if trial == 1:
@@ -176,7 +176,7 @@ def yes_no(program, browser, real, synthetic, folder):
             browser.picture(folder / "pause.png")
             browser.press(" ")
         if trial == 7:
-            # Loaded anew between trials, perhaps while a patch was on its way.
+            # Reload between trials, perhaps while a patch is loading.
             browser.until("state.answered === 8")
             browser.reload()
             browser.wait("pause")
@@ -187,14 +187,14 @@ def yes_no(program, browser, real, synthetic, folder):
     browser.run("document.getElementById('more').open = true")
     browser.picture(folder / "result.png")
     subject = folder / "out/ann"
-    # Whether the patch had been sent before the page was loaded anew is a matter of moments.
+    # The patch may have been sent before the reload.
     at = showings.index(None)
     showings[at : at + 2] = [int(rows_of(subject)[at]["showings"])]
     assert showings[at] in (1, 2)
     summary, _ = check_results(subject, given, ("real", "synthetic"), showings, EXPOSURE_MS)
     shown = browser.run("[...document.querySelectorAll('#row tbody tr')].map(r => [...r.cells].map(c => c.firstChild.textContent))")
     counts = summary["row"]["counts"]
-    assert shown[0][:5] == ["ann", *(str(counts[name]) for name in ("tp", "fp", "tn", "fn"))], shown
+    assert shown[0][:5] == ["01", *(str(counts[name]) for name in ("tp", "fp", "tn", "fn"))], shown
     assert shown[1][0] == "x"
     names = [path.name for side in (real, synthetic) for path in Path(side).rglob("*.png")] + [str(real), str(synthetic)]
     check_secrets(browser, address, names)
@@ -213,7 +213,7 @@ def pairs(program, browser, real, synthetic, folder):
     given = []
     for trial in range(5):
         if trial == 2:
-            # A picture of what is gone again is no harm.
+            # The screen may have changed before the screenshot.
             browser.until("['patch', 'question'].includes(document.body.dataset.screen)")
             browser.picture(folder / "pairs-patch.png")
         browser.wait("question")
@@ -232,7 +232,7 @@ def pairs(program, browser, real, synthetic, folder):
 
 
 def montage(browser, folder):
-    """Four pages beside each other, for the README."""
+    """Draws four screenshots side by side, for the README."""
     names = ["welcome", "patch", "question", "result"]
     pages = [base64.b64encode((folder / f"{name}.png").read_bytes()).decode() for name in names]
     images = "".join(f'<img src="data:image/png;base64,{page}" width="638">' for page in pages)
@@ -258,8 +258,8 @@ def main():
     finally:
         browser.close()
     pooled = subprocess.run([program, "study", "--results", folder / "out"], check=True, capture_output=True, text=True).stdout
-    assert "ann" in pooled and "pooled" in pooled and "384 trials" in pooled, pooled
-    print(f"the experiment went through in {Path(chromium).name}; screenshots are in {folder}")
+    assert "01" in pooled and "pooled" in pooled and "384 trials" in pooled, pooled
+    print(f"the study passed in {Path(chromium).name}; screenshots are in {folder}")
 
 
 if __name__ == "__main__":

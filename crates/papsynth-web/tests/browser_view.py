@@ -1,4 +1,4 @@
-"""Looks at a data set with a stack in a real browser, with keyboard and mouse, and holds the page against the data set's own files.
+"""Views a data set with a focus stack in a real browser, with keyboard and mouse, and compares the page with the files.
 
 Usage: browser.py PAPSYNTH CHROMIUM DATASET FOLDER
 
@@ -17,7 +17,7 @@ from chromium import Browser, Served  # noqa: E402
 
 
 class Viewer(Browser):
-    """A browser that knows the page."""
+    """A browser with the page of the viewer."""
 
     def ready(self):
         self.until("document.body?.dataset.ready === 'true'", lambda: self.run("document.getElementById('message').textContent"))
@@ -29,11 +29,11 @@ class Viewer(Browser):
         return self.run("({...view})")
 
     def middle(self):
-        """The middle of the canvas on the page."""
+        """Returns the centre of the canvas on the page."""
         return self.run("(r => [r.x + r.width / 2, r.y + r.height / 2])(canvas.getBoundingClientRect())")
 
     def pixel(self, x, y):
-        """What the canvas shows at a point of the page."""
+        """Returns the canvas pixel at a point of the page."""
         return self.run(f"""(r => {{
             const own = new OffscreenCanvas(1, 1).getContext("2d");
             own.drawImage(canvas, Math.floor({x} - r.x), Math.floor({y} - r.y), 1, 1, 0, 0, 1, 1);
@@ -41,9 +41,9 @@ class Viewer(Browser):
         }})(canvas.getBoundingClientRect())""")
 
     def tile_pixel(self, layer, x, y):
-        """What the finest tile of a layer holds at a pixel of the picture."""
+        """Returns the pixel of the finest tile of a layer."""
         return self.run(f"""(async () => {{
-            const side = picture.tile;
+            const side = image.tile;
             const response = await fetch(`{layer}/0/${{Math.floor({y} / side)}}-${{Math.floor({x} / side)}}.png`);
             const image = await createImageBitmap(await response.blob());
             const own = new OffscreenCanvas(image.width, image.height).getContext("2d");
@@ -64,7 +64,7 @@ def near(a, b, most):
 def check_moves(browser):
     whole = browser.view()
     middle = browser.middle()
-    # Events know whole pixels alone.
+    # Events have integer coordinates.
     at = [int(middle[0]) + 120, int(middle[1]) - 70]
     under = "(p => [p.px, p.py])(placeOf({ clientX: %s, clientY: %s }))" % tuple(at)
     before = browser.run(under)
@@ -84,7 +84,7 @@ def check_moves(browser):
 
 
 def check_pixels(browser):
-    """What lies on the canvas is what lies in the data set, pixel by pixel."""
+    """Compares the canvas with the image files, pixel by pixel."""
     browser.look_at(200.5, 150.5, 16)
     (x, y), wrong = browser.middle(), 0
     for dx, dy in [(0, 0), (-7, 3), (9, -4), (12, 8), (-11, -6), (5, 9)]:
@@ -105,14 +105,14 @@ def check_planes(browser):
     browser.ready()
     assert browser.text("plane-text").endswith("5 of 5") and browser.run("element('plane').value") == "4"
     other = [browser.pixel(place[0] + 16 * k, place[1]) for k in range(-9, 9)]
-    assert other != shown, "another plane looks otherwise"
+    assert other != shown, "another plane differs"
     browser.press("[")
     browser.until("view.plane === 3")
     browser.ready()
 
 
 def check_labels(browser, nucleus, folder):
-    """The table says where a nucleus is; it is filled, named, and switched off again."""
+    """Shows the label of a nucleus from the table, clicks it, and hides the labels again."""
     x, y = (round(float(nucleus[f"centroid_{axis}_px"])) for axis in "xy")
     browser.look_at(x + 0.5, y + 0.5, 8)
     place = browser.middle()
@@ -143,10 +143,10 @@ def check_labels(browser, nucleus, folder):
 def check_reload(browser):
     browser.look_at(100.5, 120.5, 4, plane=1, labels="debris:50")
     browser.press("n")
-    browser.until("picture.name === 'frame 1' && view.number === 1")
+    browser.until("image.name === 'frame 1' && view.number === 1")
     browser.until("location.hash.includes('n=1')")
     before = browser.view()
-    assert before["x"] == 100.5 and before["plane"] == 1, "the next picture is seen at the same place"
+    assert before["x"] == 100.5 and before["plane"] == 1, "the next image is shown at the same position"
     browser.run("window.old = true")
     browser.call("Page.reload")
     browser.until("!window.old && document.body?.dataset.ready === 'true'")
@@ -155,7 +155,7 @@ def check_reload(browser):
     assert browser.run("groups.get('debris').on && groups.get('debris').opacity") == 0.5
     assert browser.run("element('next').disabled") and not browser.run("element('previous').disabled")
     browser.press("p")
-    browser.until("picture.name === 'frame 0'")
+    browser.until("image.name === 'frame 0'")
 
 
 def main():
@@ -186,7 +186,7 @@ def main():
         browser.close()
     code, _ = served.interrupt()
     assert code == 0, code
-    print(f"the viewer was looked through in {Path(chromium).name}; screenshots are in {folder}")
+    print(f"the viewer passed in {Path(chromium).name}; screenshots are in {folder}")
 
 
 if __name__ == "__main__":

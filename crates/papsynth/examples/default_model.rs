@@ -1,12 +1,12 @@
-//! Writes the model that ships, from real material and from published tables.
+//! Writes the built-in model, from reference images and published tables.
 //!
 //! ```sh
 //! cargo run --release -p papsynth --example default_model -- REFERENCE crates/papsynth/model/default.json
 //! ```
 //!
-//! Outlines, chromatin and its statistics are learned from `REFERENCE/outlines` and `REFERENCE/nuclei` (numbers only).
-//! Sizes are those of the Herlev table (log-normal, Jantzen et al. 2005) and absorbances those measured on
-//! monochrome liquid-based fields and on the authors' nuclei.
+//! Outlines and chromatin are learned from `REFERENCE/outlines` and `REFERENCE/nuclei` (statistics only). Sizes are
+//! those of the Herlev table (log-normal, Jantzen et al. 2005); absorbances were measured on monochrome fields of
+//! liquid-based cytology and on the authors' nuclei.
 
 #![expect(
     clippy::cast_possible_truncation,
@@ -20,21 +20,21 @@ use std::path::Path;
 
 use papsynth::learn::{Donors, LearnParams, Material, NucleusImage, Point, learn};
 use papsynth::model::{
-    CellClass, ChromatinStatistics, CytoplasmStatistics, Form, LogNormal, MODEL_VERSION, Model, Normal,
-    NucleusStatistics, Shapes,
+    CellClass, ChromatinStatistics, CytoplasmStatistics, LogNormal, MODEL_VERSION, Model, Normal, NucleusStatistics,
+    OutlineForm, Shapes,
 };
 
-/// Thickness from rim to centre in ten steps, relative to a cell's median: measured on free cells.
+/// Thickness from rim to centre in ten steps, relative to the median of a cell: measured on isolated cells.
 const RIM_TO_CENTRE: [f64; 10] = [0.61, 0.87, 0.96, 1.04, 1.08, 1.14, 1.22, 1.23, 1.31, 1.31];
 
-/// The outline, counted from 1, that is two cells joined by a bridge.
+/// Number (from 1) of the outline that is two connected cells.
 const TWO_CELLS: usize = 21;
 
-/// Size of the reference's pixels, µm.
+/// Pixel size of the reference images, µm.
 const PIXEL_UM: f64 = 0.25;
 
-/// What a class is like beyond what its images show.
-struct Facts {
+/// Published values of a class.
+struct Published {
     name: &'static str,
     bethesda: &'static str,
     /// Cell diameter, µm: mean and sd of the natural logarithm.
@@ -43,16 +43,16 @@ struct Facts {
     nucleus: [f64; 2],
     /// Correlation of their logarithms.
     correlation: f64,
-    /// Distance of the nucleus from the cell's middle, fraction of the radius.
+    /// Distance of the nucleus from the centre of the cell, fraction of the radius: mean and sd.
     off_centre: [f64; 2],
     /// Absorbance of the cytoplasm: median, sd of the logarithm.
     cytoplasm: [f64; 2],
-    /// Folder of the nuclei, and file of their outlines.
+    /// Folder of the nuclei and file of their outlines.
     nuclei: [&'static str; 2],
 }
 
-const CLASSES: [Facts; 3] = [
-    Facts {
+const CLASSES: [Published; 3] = [
+    Published {
         name: "intermediate",
         bethesda: "NILM",
         cell: [3.857, 0.182],
@@ -62,7 +62,7 @@ const CLASSES: [Facts; 3] = [
         cytoplasm: [0.125, 0.40],
         nuclei: ["nuclei/normal", "outlines/nucleus.csv"],
     },
-    Facts {
+    Published {
         name: "superficial",
         bethesda: "NILM",
         cell: [3.991, 0.20],
@@ -72,7 +72,7 @@ const CLASSES: [Facts; 3] = [
         cytoplasm: [0.105, 0.44],
         nuclei: ["nuclei/normal", "outlines/nucleus.csv"],
     },
-    Facts {
+    Published {
         name: "high-grade",
         bethesda: "HSIL",
         cell: [3.116, 0.236],
@@ -94,33 +94,33 @@ fn main() {
     let mut cells = outlines(&reference.join("outlines/cytoplasm.csv"));
     cells.remove(TWO_CELLS - 1);
     let mut model = Model { version: MODEL_VERSION, provenance: Vec::new(), classes: BTreeMap::new() };
-    for facts in &CLASSES {
-        let nuclei = nuclei(&reference.join(facts.nuclei[0]));
-        let nucleus_outlines = outlines(&reference.join(facts.nuclei[1]));
-        model.classes.insert(facts.name.to_owned(), blank(facts));
+    for published in &CLASSES {
+        let nuclei = nuclei(&reference.join(published.nuclei[0]));
+        let nucleus_outlines = outlines(&reference.join(published.nuclei[1]));
+        model.classes.insert(published.name.to_owned(), blank(published));
         let material = Material { nuclei: &nuclei, nucleus_outlines: &nucleus_outlines, cytoplasm_outlines: &cells };
         let params = LearnParams {
-            class: facts.name.to_owned(),
-            like: facts.name.to_owned(),
-            bethesda: facts.bethesda.to_owned(),
+            class: published.name.to_owned(),
+            like: published.name.to_owned(),
+            bethesda: published.bethesda.to_owned(),
             pixel_um: PIXEL_UM,
             source: "library of the PAPSYNTH authors (Malm, Brun, Bengtsson 2015); sizes: Herlev table".to_owned(),
             donors: Donors::NumbersOnly,
         };
         model = learn(&model, &material, &params).unwrap_or_else(|e| panic!("{e}"));
-        let class = model.classes.get_mut(facts.name).expect("just learned");
-        let known = blank(facts);
+        let class = model.classes.get_mut(published.name).expect("just learned");
+        let known = blank(published);
         class.cytoplasm.radius_um = known.cytoplasm.radius_um;
         class.nucleus.radius_um = known.nucleus.radius_um;
-        if facts.name == "superficial" {
-            // Small, condensed: darker and with less texture than those of intermediate cells.
+        if published.name == "superficial" {
+            // Small, condensed nuclei: darker and with less texture than those of intermediate cells.
             class.nucleus.absorbance = Normal { mean: 0.40, sd: 0.10 };
             class.nucleus.chromatin.sd = Normal { mean: 0.055, sd: 0.018 };
         }
         let chromatin = &class.nucleus.chromatin;
         println!(
             "{}: nuclei A {:?}, sd {:?}, skewness {}, nu {}, length {} um, profile {:?}",
-            facts.name,
+            published.name,
             class.nucleus.absorbance,
             chromatin.sd,
             chromatin.skewness,
@@ -134,9 +134,9 @@ fn main() {
     println!("{out}: {} bytes", text.len());
 }
 
-/// A class as the tables have it, before anything is learned.
-fn blank(facts: &Facts) -> CellClass {
-    let nothing = fsd_shape::ShapeStatistics {
+/// Returns a class with published values only, before learning.
+fn blank(published: &Published) -> CellClass {
+    let empty = fsd_shape::ShapeStatistics {
         harmonics: 1,
         outlines: 0,
         ln_radius_mean: 0.0,
@@ -148,29 +148,29 @@ fn blank(facts: &Facts) -> CellClass {
         roughness_sd: 0.0,
         local_roughness: 0.0,
     };
-    let shapes = Shapes { correlated: nothing.clone(), independent: nothing };
+    let shapes = Shapes { correlated: empty.clone(), independent: empty };
     let round = |v: f64| (v * 1e4).round() / 1e4;
     CellClass {
-        bethesda: facts.bethesda.to_owned(),
+        bethesda: published.bethesda.to_owned(),
         cytoplasm: CytoplasmStatistics {
-            radius_um: LogNormal { median: round(libm::exp(facts.cell[0]) / 2.0), log_sd: facts.cell[1] },
-            absorbance: LogNormal { median: facts.cytoplasm[0], log_sd: facts.cytoplasm[1] },
+            radius_um: LogNormal { median: round(libm::exp(published.cell[0]) / 2.0), log_sd: published.cell[1] },
+            absorbance: LogNormal { median: published.cytoplasm[0], log_sd: published.cytoplasm[1] },
             rim_to_centre: RIM_TO_CENTRE.to_vec(),
-            form: Form::default(),
+            form: OutlineForm::default(),
             pliability: 1.0,
             halo: None,
             shapes: shapes.clone(),
         },
         nucleus: NucleusStatistics {
             radius_um: LogNormal {
-                median: round((libm::exp(facts.nucleus[0]) / core::f64::consts::PI).sqrt()),
-                log_sd: facts.nucleus[1] / 2.0,
+                median: round((libm::exp(published.nucleus[0]) / core::f64::consts::PI).sqrt()),
+                log_sd: published.nucleus[1] / 2.0,
             },
-            size_correlation: facts.correlation,
-            form: Form::default(),
+            size_correlation: published.correlation,
+            form: OutlineForm::default(),
             nucleoli: 0.0,
             polarity: 0.0,
-            off_centre: Normal { mean: facts.off_centre[0], sd: facts.off_centre[1] },
+            off_centre: Normal { mean: published.off_centre[0], sd: published.off_centre[1] },
             absorbance: Normal { mean: 0.33, sd: 0.09 },
             chromatin: ChromatinStatistics {
                 nu: 1.0,
@@ -185,7 +185,7 @@ fn blank(facts: &Facts) -> CellClass {
     }
 }
 
-/// Outlines of a CSV file with the columns outline, k, x_px, y_px.
+/// Reads the outlines of a CSV file with the columns outline, k, x_px, y_px.
 fn outlines(path: &Path) -> Vec<Vec<Point>> {
     let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     let mut outlines: BTreeMap<u32, Vec<Point>> = BTreeMap::new();
@@ -196,7 +196,7 @@ fn outlines(path: &Path) -> Vec<Vec<Point>> {
     outlines.into_values().collect()
 }
 
-/// The nuclei of a folder with `images` and `masks`.
+/// Reads the nuclei of a folder with `images` and `masks`.
 fn nuclei(folder: &Path) -> Vec<NucleusImage> {
     let mut names: Vec<_> = std::fs::read_dir(folder.join("images"))
         .unwrap_or_else(|e| panic!("{}: {e}", folder.display()))

@@ -1,8 +1,8 @@
-//! What every parameter of a section of the recipe does: `effects SECTION OUT.png`.
+//! Shows the effect of every parameter of a section of the recipe: `effects SECTION OUT.png`.
 //!
-//! A row a parameter: the same small field with the parameter low, as the default recipe has it, and high; or with each of
-//! the values that a choice has. Rows are found in the recipe itself, of each of its kinds, so none is forgotten; only layouts from a
-//! file of the user's are not shown.
+//! Each row is one parameter: the same small field with a low, the default and a high value, or with each value of an
+//! enumeration. Rows are enumerated from the recipe itself, for all its kinds, so they are complete except for layouts
+//! that need a file.
 
 #![expect(clippy::cast_possible_truncation, reason = "a small program with small numbers")]
 
@@ -14,21 +14,23 @@ use papsynth::model::Model;
 use papsynth::recipe::{CellMix, Debris, Layout, Preset, Recipe, is_toml_table};
 use papsynth::{Engine, Inputs};
 use serde_json::{Map, Value, json};
-use support::{LINE, Outcome, enlarged, picture, save, write};
+use support::{LINE, Outcome, enlarged, save, to_image, write};
 
-/// Camera pixels of a tile, and how much larger it is shown.
+/// Camera pixels of a tile.
 const TILE: [u32; 2] = [210, 160];
+/// Magnification of a tile.
 const ZOOM: u32 = 1;
 
-/// Rows side by side, and pixels between tiles.
+/// Columns of rows.
 const COLUMNS: u32 = 2;
+/// Pixels between tiles.
 const GAP: u32 = 4;
 
-/// Factor from the default to low and high values.
+/// Ratio of the high to the default and of the default to the low value.
 const FACTOR: f64 = 4.0;
 
-/// High values of what is 0 by default, by the end of the path.
-const OF_NOTHING: [(&str, f64); 18] = [
+/// High values of parameters that are 0 by default, by the last part of the path.
+const HIGH_OF_ZERO: [(&str, f64); 18] = [
     ("centre_um", 3.0),
     ("cover_error_um", 60.0),
     ("spherical", 0.15),
@@ -49,10 +51,10 @@ const OF_NOTHING: [(&str, f64); 18] = [
     ("orangeophilic", 3.0),
 ];
 
-/// Highest values of what cannot be drawn with higher ones: a patch has to fit into its donors.
-const HIGHEST: [(&str, f64); 1] = [("nucleus.patch_um", 3.5)];
+/// Upper limits of high values: a patch must fit into its donors.
+const UPPER_LIMITS: [(&str, f64); 1] = [("nucleus.patch_um", 3.5)];
 
-/// Values of what is chosen from a list, by the path.
+/// Values of enumerations, by path.
 const CHOICES: [(&str, &[&str]); 21] = [
     ("cytoplasm.shape", &["correlated", "independent"]),
     ("cytoplasm.sheet", &["flat", "verlet", "xpbd"]),
@@ -61,14 +63,14 @@ const CHOICES: [(&str, &[&str]); 21] = [
     ("nucleus.acceptance", &["near", "threshold"]),
     ("nucleus.seam", &["min-cut", "feather"]),
     ("nucleus.restore", &["before-detection", "after-detection", "off"]),
-    ("cells.intermediate.group.form", &["alone", "heap", "honeycomb", "palisade"]),
-    ("focus.picture", &["planes", "extended"]),
+    ("cells.intermediate.group.form", &["single", "aggregate", "honeycomb", "palisade"]),
+    ("focus.output", &["planes", "edf"]),
     ("debris.leukocytes.form", &["round", "lobed"]),
     ("debris.speckles.form", &["round", "dilated"]),
     ("camera.photon_noise", &["exact", "normal", "off"]),
     ("camera.binning", &["charge", "digital"]),
-    ("camera.jpeg_subsampling", &["full", "columns", "squares"]),
-    ("layout.kind", &["clusters", "swath", "uniform"]),
+    ("camera.jpeg_subsampling", &["4:4:4", "4:2:2", "4:2:0"]),
+    ("layout.kind", &["clusters", "band", "uniform"]),
     ("background.illumination.kind", &["bowl", "border"]),
     ("optics.imaging", &["product", "abbe"]),
     ("optics.kind", &["bright-field", "gaussian"]),
@@ -77,13 +79,14 @@ const CHOICES: [(&str, &[&str]); 21] = [
     ("light.rendition", &["display", "srgb", "raw"]),
 ];
 
-/// What is a probability, by the end of the path: shown at 0 and at 1.
+/// Probabilities, by the last part of the path: shown at 0 and at 1.
 const PROBABILITIES: [&str; 9] =
     ["flap", "roll", "cigar", "granular", "pyknotic", "wrinkled", "degenerated", "on_cells", "ghosts"];
 
-/// A row: a parameter and the recipes that show it, each with what stands beneath.
+/// A row: a parameter and its recipes.
 struct Row {
     path: String,
+    /// Label and recipe of each tile.
     tiles: Vec<(String, Recipe)>,
 }
 
@@ -98,11 +101,12 @@ fn main() -> Outcome<()> {
     let out = arguments.next().unwrap_or_else(|| format!("target/effects-{section}.png"));
     let mut rows = Vec::new();
     collect(&whole, &section, of, &mut rows)?;
-    // What other kinds have that the base's has not.
+    // Fields of other kinds than the default one.
     for (path, kinds) in CHOICES.iter().filter(|(path, _)| path.starts_with(&format!("{section}."))) {
         let Some(table) = path.strip_suffix(".kind") else { continue };
         for kind in *kinds {
-            let other = with(&base(&section), path, json!(kind)).ok_or_else(|| format!("{path}: {kind} is none"))?;
+            let other =
+                with(&base(&section), path, json!(kind)).ok_or_else(|| format!("{path}: {kind} is not accepted"))?;
             let whole = serde_json::to_value(other)?;
             let of = table.split('.').fold(&whole, |at, step| &at[step]);
             collect(&whole, table, of, &mut rows)?;
@@ -119,7 +123,7 @@ fn main() -> Outcome<()> {
         for (place, (label, recipe)) in (0_u32..).zip(&row.tiles) {
             let x = corner[0] + place * (TILE[0] * ZOOM + GAP);
             let engine = Engine::new(recipe, &model, &Inputs::default()).map_err(|e| format!("{}: {e}", row.path))?;
-            let shown = picture(&engine.frame(Key { seed: 2015, index: 3 })?);
+            let shown = to_image(&engine.frame(Key { seed: 2015, index: 3 })?);
             let width = TILE[0].min(shown.width());
             let height = TILE[1].min(shown.height());
             let cut = image::imageops::crop_imm(&shown, 0, 0, width, height).to_image();
@@ -130,7 +134,7 @@ fn main() -> Outcome<()> {
     save(page, &out)
 }
 
-/// The small field on which a section is shown.
+/// Returns the small field that shows a section.
 fn base(section: &str) -> Recipe {
     let mut recipe = Preset::Lbc.recipe();
     recipe.field.width_px = f64::from(TILE[0]).into();
@@ -145,7 +149,7 @@ fn base(section: &str) -> Recipe {
     recipe.cells.insert("intermediate".to_owned(), CellMix { count: 2.0.into(), ..CellMix::default() });
     match section {
         "stain" => recipe = with(&recipe, "light", json!({ "kind": "colour" })).unwrap_or(recipe),
-        // A share of a field of many square millimetres is seldom in so small a one.
+        // At default densities, a small field contains hardly any debris.
         "debris" => recipe = abundant(&recipe),
         "layout" => {
             recipe.layout = Preset::Lbc.recipe().layout;
@@ -157,21 +161,21 @@ fn base(section: &str) -> Recipe {
     recipe
 }
 
-/// The recipe with so much debris that some of each kind lies in a small field.
+/// Returns the recipe with enough debris that a small field contains some of each kind.
 fn abundant(recipe: &Recipe) -> Recipe {
-    const COUNTS: [&str; 7] = ["count", "clusters", "colonies", "groups", "strands", "drifts", "share"];
+    const COUNTS: [&str; 6] = ["count", "clusters", "colonies", "groups", "strands", "fraction"];
     let mut whole = serde_json::to_value(recipe).unwrap_or_default();
     if let Some(kinds) = whole.get_mut("debris").and_then(Value::as_object_mut) {
         for kind in kinds.values_mut().filter_map(Value::as_object_mut) {
             for (name, value) in kind.iter_mut().filter(|(name, _)| COUNTS.contains(&name.as_str())) {
-                *value = json!(if name == "share" { 0.5 } else { 2.0 });
+                *value = json!(if name == "fraction" { 0.5 } else { 2.0 });
             }
         }
     }
     serde_json::from_value(whole).unwrap_or_else(|_| recipe.clone())
 }
 
-/// The rows of everything below a path that are not there already.
+/// Adds the rows of all parameters below a path, except existing ones.
 fn collect(whole: &Value, path: &str, value: &Value, rows: &mut Vec<Row>) -> Outcome<()> {
     match value {
         Value::Object(fields) if is_toml_table(value) => {
@@ -179,7 +183,7 @@ fn collect(whole: &Value, path: &str, value: &Value, rows: &mut Vec<Row>) -> Out
         }
         _ if rows.iter().any(|row| row.path == path) => Ok(()),
         Value::String(_) => {
-            rows.push(choice(whole, path).ok_or_else(|| format!("{path}: no values are known that it may have"))?);
+            rows.push(choice(whole, path).ok_or_else(|| format!("{path}: add its values to `CHOICES`"))?);
             Ok(())
         }
         _ => {
@@ -214,10 +218,10 @@ fn number(whole: &Value, path: &str, value: &Value) -> Option<Row> {
     let (low, high) = if PROBABILITIES.contains(&name) {
         (0.0, 1.0)
     } else if middle == 0.0 {
-        let high = OF_NOTHING.iter().find(|(known, _)| *known == name).map_or(1.0, |(_, high)| *high);
+        let high = HIGH_OF_ZERO.iter().find(|(known, _)| *known == name).map_or(1.0, |(_, high)| *high);
         (0.0, high)
     } else {
-        let high = HIGHEST.iter().find(|(known, _)| *known == path).map_or(f64::INFINITY, |(_, high)| *high);
+        let high = UPPER_LIMITS.iter().find(|(known, _)| *known == path).map_or(f64::INFINITY, |(_, high)| *high);
         (middle / FACTOR, (middle * FACTOR).min(high))
     };
     let tile = |value: f64| nearest(&recipe, path, value, middle).map(|(value, recipe)| (shown(value), recipe));
@@ -225,7 +229,7 @@ fn number(whole: &Value, path: &str, value: &Value) -> Option<Row> {
     Some(Row { path: path.to_owned(), tiles })
 }
 
-/// Of debris only the kind that a path belongs to, so that it can be seen.
+/// Removes all debris except the kind of a path.
 fn alone(recipe: &Recipe, path: &str) -> Recipe {
     let Some(kind) = path.strip_prefix("debris.").and_then(|rest| rest.split('.').next()) else {
         return recipe.clone();
@@ -237,19 +241,19 @@ fn alone(recipe: &Recipe, path: &str) -> Recipe {
     serde_json::from_value(whole).unwrap_or_else(|_| recipe.clone())
 }
 
-/// The recipe with the value nearest to the one wanted, on the way to the default, that a recipe accepts.
+/// Returns the recipe with the accepted value nearest to `wanted`, between `wanted` and the default.
 fn nearest(recipe: &Recipe, path: &str, wanted: f64, middle: f64) -> Option<(f64, Recipe)> {
     const STEPS: i32 = 40;
     (0..=STEPS).find_map(|step| {
         let value = wanted + (middle - wanted) * f64::from(step) / f64::from(STEPS);
-        // Where things are counted, only whole numbers are taken.
+        // Counts accept only integers.
         [value, libm::round(value)].into_iter().find_map(|value| {
             with(recipe, path, json!(value)).or_else(|| with(recipe, path, json!(value as i64))).map(|r| (value, r))
         })
     })
 }
 
-/// The recipe with another value at a path, if that is a sound one.
+/// Returns the recipe with another value at a path, or `None` if the recipe is invalid.
 fn with(recipe: &Recipe, path: &str, value: Value) -> Option<Recipe> {
     let mut whole = serde_json::to_value(recipe).ok()?;
     let (section, name) = path.rsplit_once('.').unwrap_or(("", path));

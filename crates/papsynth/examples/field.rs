@@ -1,4 +1,4 @@
-//! Renders one image of a preset, or of a recipe, to a PNG: the smallest program that uses the engine.
+//! Renders one image of a preset or recipe file to a PNG: a minimal program that uses the engine.
 //!
 //! ```sh
 //! cargo run --release -p papsynth --example field -- lbc 7 target/field.png
@@ -29,6 +29,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (width, height) = (u32::try_from(view.width)?, u32::try_from(view.height)?);
     let colour = if frame.planes[0].channels == 3 { image::ColorType::Rgb8 } else { image::ColorType::L8 };
     image::save_buffer(&out, &pixels, width, height, colour)?;
-    eprintln!("{out}: {width} x {height}, {} rows of truth", frame.finished.truth.objects.len());
+    eprintln!("{out}: {width} x {height}, {} rows of ground truth", frame.finished.truth.objects.len());
     Ok(())
 }

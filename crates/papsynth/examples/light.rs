@@ -1,7 +1,7 @@
-//! Pictures of what light does: `light NAME OUT.png`, NAME one of focus, halo, colour.
+//! Draws images that show the optics: `light NAME OUT.png`, NAME one of focus, halo, colour.
 //!
-//! focus: a nucleus at five travels of the stage, by products of filtered light (the default), by Abbe's integration over
-//! the source, and by the paper's Gaussians. halo: a refracting speck through focus, alike. colour: a field in colour.
+//! focus: a nucleus at five stage positions, with the product model (the default), Abbe's integration over the source,
+//! and the paper's Gaussians. halo: a refracting speck through focus, with the same models. colour: a field in colour.
 
 #![expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small program with small numbers")]
 
@@ -16,7 +16,7 @@ use papsynth::{Engine, Error, Inputs, Threads};
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
-/// Travels of the stage, µm.
+/// Stage positions, µm.
 const STAGES_UM: [f64; 5] = [-4.0, -2.0, 0.0, 2.0, 4.0];
 
 fn main() -> Outcome<()> {
@@ -32,7 +32,7 @@ fn main() -> Outcome<()> {
     Ok(())
 }
 
-/// A field of a few micrometres without noise, shade or debris.
+/// Returns a recipe for a field of a few micrometres without noise, shading or debris.
 fn bare() -> Recipe {
     let mut recipe = Preset::Sparse.recipe();
     recipe.field.width_px = 64.0.into();
@@ -44,7 +44,7 @@ fn bare() -> Recipe {
     recipe.cells.clear();
     recipe.debris = Debris::none();
     recipe.background.illumination = Illumination::Border(Border { exponent: 0.0.into() });
-    recipe.background.scatter = 0.0.into();
+    recipe.background.texture = 0.0.into();
     recipe.background.level = 0.8.into();
     recipe.camera.photon_noise = PhotonNoise::Off;
     recipe.camera.read_noise_e = 0.0.into();
@@ -82,7 +82,7 @@ fn speck() -> Recipe {
     recipe
 }
 
-/// The planes side by side: products, Abbe, Gaussians from top to bottom; so many pixels of the middle of the field each way.
+/// Draws the planes in columns and the models (product, Abbe, Gaussian) in rows, cropped to the central `pixels`.
 fn through_focus(recipe: &Recipe, pixels: u32, zoom: u32) -> Outcome<GrayImage> {
     const GAP: u32 = 4;
     let (engine, scene) = scene(recipe)?;
@@ -111,7 +111,7 @@ fn through_focus(recipe: &Recipe, pixels: u32, zoom: u32) -> Outcome<GrayImage> 
             Ok(())
         })?;
     }
-    // Half the size is enough to see and a quarter to keep.
+    // Half the size shows the same in a quarter of the bytes.
     let (width, height) = (sheet.width() / 2, sheet.height() / 2);
     Ok(image::imageops::resize(&sheet, width, height, image::imageops::FilterType::Triangle))
 }
@@ -131,8 +131,8 @@ fn colour() -> Outcome<RgbImage> {
     });
     let engine = Engine::new(&recipe, &Model::builtin(), &Inputs::default())?;
     let frame = engine.frame(Key { seed: 2015, index: 5 })?;
-    // Without noise, which a smaller picture would not show and a PNG would keep.
+    // Without noise, which is invisible at this size and would enlarge the PNG.
     let rgb: Vec<u8> = frame.planes[0].noise_free.iter().map(|level| (level + 0.5).min(255.0) as u8).collect();
-    let whole = RgbImage::from_raw(1000, 620, rgb).ok_or("the size of the picture")?;
+    let whole = RgbImage::from_raw(1000, 620, rgb).ok_or("the image has another size")?;
     Ok(image::imageops::resize(&whole, 500, 310, image::imageops::FilterType::Triangle))
 }

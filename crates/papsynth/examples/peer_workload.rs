@@ -1,9 +1,9 @@
-//! The workload of the Python peer, timed: `peer_workload frame|stack|throughput COUNT [THREADS]`.
+//! Times the workload of the Python reference program: `peer_workload frame|stack|throughput COUNT [THREADS]`.
 //!
-//! Prints one line of JSON with the medians of process CPU time and wall time per frame or stack, and the peak of
-//! resident memory. Truth is made with every image; no file is written.
+//! Prints one line of JSON with the medians of process CPU time and wall time per frame or stack, and peak resident
+//! memory. Includes the ground truth of every image; writes no files.
 
-#![expect(clippy::print_stdout, reason = "what it measures is its output")]
+#![expect(clippy::print_stdout, reason = "the program prints its measurements")]
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -14,7 +14,7 @@ use papsynth::recipe::{Number, Recipe};
 use papsynth::truth::Group;
 use papsynth::{Engine, Error, Inputs, Threads};
 
-/// The recipe that mirrors the peer's defaults.
+/// The recipe that matches the defaults of the reference program.
 const RECIPE: &str = include_str!("../../../benches/peer.toml");
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -28,15 +28,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         recipe.focus.step_um = Number::Fixed(0.4);
     }
     let engine = Engine::new(&recipe, &Model::builtin(), &Inputs::default())?;
-    let mut views = Views::default();
+    let mut buffers = TruthBuffers::default();
     if what == "throughput" {
         return throughput(&engine, count, threads);
     }
-    render(&engine, 0, &mut views)?;
+    render(&engine, 0, &mut buffers)?;
     let (mut cpu, mut wall) = (Vec::new(), Vec::new());
     for index in 1..=count {
         let (c, w) = (cpu_seconds(), now());
-        render(&engine, index, &mut views)?;
+        render(&engine, index, &mut buffers)?;
         cpu.push(cpu_seconds() - c);
         wall.push(w.elapsed().as_secs_f64());
     }
@@ -50,14 +50,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Frames a second of wall time with so many threads, each making whole frames.
+/// Prints frames per second of wall time with several threads, one frame per thread.
 fn throughput(engine: &Engine, count: u64, threads: u64) -> Result<(), Box<dyn std::error::Error>> {
     let (start, next) = (now(), AtomicU64::new(0));
     std::thread::scope(|scope| {
         let work = || {
-            let mut views = Views::default();
+            let mut buffers = TruthBuffers::default();
             while let Some(index) = Some(next.fetch_add(1, Ordering::Relaxed)).filter(|index| *index < count) {
-                render(engine, index, &mut views)?;
+                render(engine, index, &mut buffers)?;
             }
             Ok::<(), Error>(())
         };
@@ -69,14 +69,14 @@ fn throughput(engine: &Engine, count: u64, threads: u64) -> Result<(), Box<dyn s
     Ok(())
 }
 
-/// Memory for label maps and layers.
+/// Buffers for label maps and overlap counts.
 #[derive(Default)]
-struct Views {
+struct TruthBuffers {
     ids: Vec<u32>,
     layers: Vec<u16>,
 }
 
-fn render(engine: &Engine, index: u64, views: &mut Views) -> Result<(), Error> {
+fn render(engine: &Engine, index: u64, buffers: &mut TruthBuffers) -> Result<(), Error> {
     let mut sum = 0_u64;
     let truth = engine
         .stream::<Error>(Key { seed: 3, index }, Threads::One, |plane| {
@@ -85,15 +85,15 @@ fn render(engine: &Engine, index: u64, views: &mut Views) -> Result<(), Error> {
         })?
         .truth;
     for group in Group::ALL {
-        truth.labels_into(group, &mut views.ids);
-        std::hint::black_box(&views.ids);
+        truth.labels_into(group, &mut buffers.ids);
+        std::hint::black_box(&buffers.ids);
     }
-    truth.layers_into(&mut views.layers);
-    std::hint::black_box((sum, &views.layers, truth.objects.len()));
+    truth.layers_into(&mut buffers.layers);
+    std::hint::black_box((sum, &buffers.layers, truth.objects.len()));
     Ok(())
 }
 
-#[expect(clippy::disallowed_methods, reason = "a bench is what clocks are for")]
+#[expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 fn now() -> Instant {
     Instant::now()
 }
@@ -103,13 +103,13 @@ fn median(values: &mut [f64]) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// CPU time of this process so far, user and system.
+/// Returns the CPU time of this process so far, user and system, in seconds.
 fn cpu_seconds() -> f64 {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
     time.tv_sec as f64 + time.tv_nsec as f64 / 1e9
 }
 
-/// Peak of resident memory, MB.
+/// Returns the peak resident memory, MB.
 fn peak_mb() -> f64 {
     let text = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = text.lines().find(|line| line.starts_with("VmHWM"));

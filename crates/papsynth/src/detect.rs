@@ -1,4 +1,4 @@
-//! Signal detection: from light to grey levels (Eq. 13), and how detectable an object is in them.
+//! Signal detection: light to grey levels (Eq. 13), and the contrast of objects relative to noise.
 
 use ccd_noise::{Blooming, Camera, CameraParams, Jpeg, JpegParams, ReadNoise, SaturatedRun};
 use dye_spectra::{Colour, ColourParams, Lamp};
@@ -9,61 +9,61 @@ use crate::recipe::{Binning, Mixing, PhotonNoise, Rendition, Subsampling};
 use crate::scene::{Scene, SceneCamera, SceneLight};
 use crate::truth::{Mask, Run};
 
-/// Electrons above which [`PhotonNoise::Normal`] draws one normal deviate: the skewness 1/√µ is below 0.05.
+/// Mean electrons above which [`PhotonNoise::Normal`] draws one normal deviate: the skewness 1/√µ is below 0.05.
 const NORMAL_ABOVE_E: f64 = 400.0;
 
-/// How much more than the largest grey level stands for a pixel holds: the converter clips first, as in real cameras.
+/// Full-well capacity relative to the charge of the highest grey level: the converter clips first, as in real cameras.
 const WELL_MARGIN: f64 = 1.02;
 
-/// Bits of the converter of a camera that makes colours of its grey levels before it hands them over.
+/// Bit depth of the converter of a camera that computes colours or fused planes from its grey levels.
 const INNER_BITS: u32 = 16;
 
-/// Colours of the sensor as they are.
+/// The identity matrix: sensor colours without conversion.
 const UNCHANGED: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// The camera of a scene.
 pub(crate) struct Detector {
     channels: Vec<Channel>,
-    /// Bits of the grey levels that it makes; planes that are to be fused have more than the picture.
+    /// Bit depth of its grey levels; planes for fusion have more bits than the final image.
     pub(crate) bits: u32,
-    /// How colours are made of the channels, if they are.
+    /// Conversion of the channels to colours, if any.
     srgb: Option<Srgb>,
     jpeg: Option<Jpeg>,
 }
 
-/// The camera as one channel sees it.
+/// The camera parameters of one channel.
 struct Channel {
     camera: Camera,
-    /// Electrons of light 1: white balance leaves fewer to the colours of which lamp and sensor have little.
+    /// Electrons of light 1; fewer in channels where lamp and sensor give little light, which white balance amplifies.
     full_scale_e: f64,
-    /// Part of these that is glare, whatever lies in the light's way.
+    /// Fraction of these electrons that is glare, independent of the specimen.
     glare: f64,
 }
 
-/// What is on its way from electrons to grey levels, channel by channel.
+/// Buffers for the conversion of electrons to grey levels, one entry per channel.
 #[derive(Debug, Default)]
-pub(crate) struct Developing {
+pub(crate) struct ExposureBuffers {
     /// Columns of the frame.
     width: usize,
-    /// Of the noise of each channel.
+    /// Noise key of each channel.
     keys: Vec<u64>,
     levels: Vec<Vec<u16>>,
     means: Vec<Vec<f32>>,
-    /// Runs of saturated pixels, of all channels.
+    /// Runs of saturated pixels in all channels.
     saturated: Vec<SaturatedRun>,
-    /// Electrons of the whole frame, for a camera that blooms.
+    /// Electrons of the complete frame, for a camera with blooming.
     frame: Vec<Vec<f32>>,
 }
 
-impl Developing {
-    /// Makes room for a frame.
+impl ExposureBuffers {
+    /// Resets the buffers for a frame.
     pub(crate) fn start(&mut self, width: usize, keys: Vec<u64>) {
         (self.width, self.keys) = (width, keys);
         self.saturated.clear();
         self.frame.iter_mut().for_each(Vec::clear);
     }
 
-    /// The pixels that were saturated in some channel.
+    /// Returns the pixels that are saturated in at least one channel.
     pub(crate) fn saturated(&mut self) -> Mask {
         self.saturated.sort_by_key(|run| (run.y, run.x0));
         let mut runs: Vec<Run> = Vec::new();
@@ -77,7 +77,7 @@ impl Developing {
     }
 }
 
-/// How dyes become colours in the light of a lamp.
+/// The conversion of dye amounts to colours under a lamp.
 pub(crate) fn colour(lamp_k: f64, mixing: Mixing) -> Result<Colour, Cause> {
     let params = ColourParams {
         lamp: Lamp::Halogen { temperature_k: lamp_k },
@@ -96,76 +96,89 @@ impl Detector {
         let params = JpegParams {
             quality: camera.jpeg_quality,
             subsampling: match camera.jpeg_subsampling {
-                Subsampling::Full => ccd_noise::Subsampling::Full,
-                Subsampling::Columns => ccd_noise::Subsampling::Columns,
-                Subsampling::Squares => ccd_noise::Subsampling::Squares,
+                Subsampling::S444 => ccd_noise::Subsampling::S444,
+                Subsampling::S422 => ccd_noise::Subsampling::S422,
+                Subsampling::S420 => ccd_noise::Subsampling::S420,
             },
             bit_depth: camera.bits,
         };
         let jpeg = (camera.jpeg_quality > 0).then(|| Jpeg::new(&params)).transpose()?;
-        // What is fused is rounded once more afterwards.
-        let unfused = if scene.fusion.is_some() { INNER_BITS } else { camera.bits };
+        // Fusion rounds once more, so the planes keep more bits.
+        let plane_bits = if scene.fusion.is_some() { INNER_BITS } else { camera.bits };
         match scene.light {
             SceneLight::Monochrome { .. } => {
-                let channels = vec![Channel::new(&camera, unfused, 1.0)?];
-                Ok(Self { channels, bits: unfused, srgb: None, jpeg })
+                let channels = vec![Channel::new(&camera, plane_bits, 1.0)?];
+                Ok(Self { channels, bits: plane_bits, srgb: None, jpeg })
             }
             SceneLight::Colour { rendition, lamp_k, mixing, .. } => {
                 let colour = colour(lamp_k, mixing)?;
-                let (bits, handed_over) = match rendition {
-                    Rendition::Raw => (unfused, unfused),
+                let (bits, output_bits) = match rendition {
+                    Rendition::Raw => (plane_bits, plane_bits),
                     Rendition::Display | Rendition::Srgb => (INNER_BITS, camera.bits),
                 };
-                let channel = |of: &dye_spectra::Channel| Channel::new(&camera, bits, of.share);
+                let channel = |of: &dye_spectra::Channel| Channel::new(&camera, bits, of.relative_light);
                 let channels = colour.channels().iter().map(channel).collect::<Result<_, _>>()?;
                 let srgb = match rendition {
                     Rendition::Raw => None,
                     Rendition::Display => Some(Srgb::new(&UNCHANGED, INNER_BITS, camera.bits)),
                     Rendition::Srgb => Some(Srgb::new(colour.to_srgb(), INNER_BITS, camera.bits)),
                 };
-                Ok(Self { channels, bits: handed_over, srgb, jpeg })
+                Ok(Self { channels, bits: output_bits, srgb, jpeg })
             }
         }
     }
 
-    /// Light as a fraction of full scale becomes mean electrons.
+    /// Converts light as a fraction of full scale to mean electrons, in place.
     pub(crate) fn electrons(&self, channel: usize, light: &mut [f32]) {
         let Channel { full_scale_e, glare, .. } = self.channels[channel];
         let (scale, glare) = ((full_scale_e * (1.0 - glare)) as f32, (full_scale_e * glare) as f32);
-        scaled(light, scale, glare);
+        scale_and_add(light, scale, glare);
     }
 
-    /// Takes in rows that begin at row `first`. Their grey levels, channels side by side, stand in `grey` at once, unless
-    /// charge crosses rows in this camera: then when all rows were [`finish`](Self::finish)ed.
-    pub(crate) fn expose(&self, electrons: &[&mut [f32]], first: usize, grey: &mut [u16], developing: &mut Developing) {
+    /// Exposes rows from row `first` on and writes their grey levels, channels interleaved, to `grey`.
+    ///
+    /// If charge crosses rows in this camera, [`finish`](Self::finish) writes the grey levels instead.
+    pub(crate) fn expose(
+        &self,
+        electrons: &[&mut [f32]],
+        first: usize,
+        grey: &mut [u16],
+        buffers: &mut ExposureBuffers,
+    ) {
         if self.needs_whole_frame() {
-            developing.frame.resize(self.channels.len(), Vec::new());
-            developing.frame.iter_mut().zip(electrons).for_each(|(frame, rows)| frame.extend_from_slice(rows));
+            buffers.frame.resize(self.channels.len(), Vec::new());
+            buffers.frame.iter_mut().zip(electrons).for_each(|(frame, rows)| frame.extend_from_slice(rows));
             return;
         }
-        let Developing { width, keys, levels, saturated, .. } = developing;
+        let ExposureBuffers { width, keys, levels, saturated, .. } = buffers;
         let origin = [0, u32::try_from(first).unwrap_or(u32::MAX)];
         let mut expose = |channel: &Channel, electrons: &[f32], key, levels: &mut [u16]| {
             channel.camera.expose_window_marking(electrons, *width, origin, key, levels, saturated);
         };
         match (&self.channels[..], electrons) {
             ([channel], [electrons]) => expose(channel, electrons, keys[0], grey),
-            _ => self.develop(electrons.iter().map(|rows| &**rows), keys, levels, grey, expose),
+            _ => self.expose_channels(electrons.iter().map(|rows| &**rows), keys, levels, grey, expose),
         }
     }
 
-    /// What can be done with a whole frame alone: charge that crosses rows.
-    pub(crate) fn finish(&self, grey: &mut [u16], developing: &mut Developing) {
+    /// Exposes the complete frame if charge crosses rows in this camera.
+    pub(crate) fn finish(&self, grey: &mut [u16], buffers: &mut ExposureBuffers) {
         if self.needs_whole_frame() {
-            let Developing { width, keys, levels, saturated, frame, .. } = developing;
-            self.develop(frame.iter().map(|rows| &rows[..]), keys, levels, grey, |channel, electrons, key, levels| {
-                channel.camera.expose_frame(electrons, *width, key, levels, saturated);
-            });
+            let ExposureBuffers { width, keys, levels, saturated, frame, .. } = buffers;
+            self.expose_channels(
+                frame.iter().map(|rows| &rows[..]),
+                keys,
+                levels,
+                grey,
+                |channel, electrons, key, levels| {
+                    channel.camera.expose_frame(electrons, *width, key, levels, saturated);
+                },
+            );
         }
     }
 
-    /// Grey levels of all channels, side by side. `levels` is memory for those of each.
-    fn develop<'a>(
+    /// Writes the grey levels of all channels, interleaved. `levels` is a buffer for each channel.
+    fn expose_channels<'a>(
         &self,
         electrons: impl Iterator<Item = &'a [f32]>,
         keys: &[u64],
@@ -184,7 +197,7 @@ impl Detector {
         }
     }
 
-    /// JPEG, of a finished frame.
+    /// Compresses and decompresses a finished frame as JPEG, if the camera does.
     pub(crate) fn compress(&self, width: usize, grey: &mut [u16]) {
         match (&self.jpeg, self.channels.len()) {
             (None, _) => {}
@@ -201,13 +214,13 @@ impl Detector {
         self.channels.iter().any(|channel| channel.camera.needs_whole_frame())
     }
 
-    /// Grey levels without any noise and before rounding.
-    pub(crate) fn mean_dn_into(&self, electrons: &[&mut [f32]], out: &mut [f32], developing: &mut Developing) {
+    /// Writes expected grey levels, without noise and before rounding.
+    pub(crate) fn mean_dn_into(&self, electrons: &[&mut [f32]], out: &mut [f32], buffers: &mut ExposureBuffers) {
         if let ([channel], [electrons]) = (&self.channels[..], electrons) {
             channel.camera.mean_dn_into(electrons, out);
             return;
         }
-        let means = &mut developing.means;
+        let means = &mut buffers.means;
         means.resize(self.channels.len(), Vec::new());
         for ((channel, electrons), means) in self.channels.iter().zip(electrons).zip(means.iter_mut()) {
             means.resize(electrons.len(), 0.0);
@@ -219,20 +232,21 @@ impl Detector {
         }
     }
 
-    /// How far a pixel of so many mean electrons stands out from what it would be with more light, relative to its noise.
+    /// Returns the difference in grey level between a pixel with `without` and with `electrons` mean electrons,
+    /// relative to the noise of the latter.
     pub(crate) fn contrast(&self, channel: usize, electrons: f64, without: f64) -> f64 {
         let camera = &self.channels[channel].camera;
-        let noise_dn = camera.noise_dn(electrons).max(f64::MIN_POSITIVE);
+        let noise_dn = camera.temporal_noise_dn(electrons).max(f64::MIN_POSITIVE);
         (camera.expected_dn(without) - camera.expected_dn(electrons)) / noise_dn
     }
 }
 
 impl Channel {
-    /// `share` is the light of the channel relative to the brightest one's.
-    fn new(camera: &SceneCamera, bits: u32, share: f64) -> Result<Self, Cause> {
+    /// `relative_light` is the light of the channel relative to the brightest channel.
+    fn new(camera: &SceneCamera, bits: u32, relative_light: f64) -> Result<Self, Cause> {
         let largest = libm::exp2(f64::from(bits)) - 1.0;
         let offset_dn = camera.offset_dn * libm::exp2(f64::from(bits) - f64::from(camera.bits));
-        let (range_dn, glare) = (largest - offset_dn, camera.glare_removed);
+        let (range_dn, glare) = (largest - offset_dn, camera.glare_subtracted);
         let params = CameraParams {
             exposure_s: camera.exposure_s,
             dark_current_e_per_s: camera.dark_current_e_per_s,
@@ -245,14 +259,14 @@ impl Channel {
             full_well_e: camera.full_well_e * WELL_MARGIN,
             blooming: match camera.blooming {
                 0.0 => Blooming::Off,
-                share => Blooming::On { vertical: camera.blooming_vertical, anti_blooming: 1.0 - share },
+                fraction => Blooming::On { vertical: camera.blooming_vertical, anti_blooming: 1.0 - fraction },
             },
             read_noise: match camera.read_noise_rms_e {
                 0.0 => ReadNoise::Same { e: camera.read_noise_e },
                 rms_e => ReadNoise::PerPixel { median_e: camera.read_noise_e, rms_e },
             },
-            // What is left of the range without the glare fills it again.
-            gain_dn_per_e: range_dn / (1.0 - glare) / (camera.full_well_e * share),
+            // Glare is subtracted, so the remaining light is scaled to the full range.
+            gain_dn_per_e: range_dn / (1.0 - glare) / (camera.full_well_e * relative_light),
             offset_dn: offset_dn - range_dn * glare / (1.0 - glare),
             bit_depth: bits,
             photon_noise: match camera.photon_noise {
@@ -274,7 +288,7 @@ impl Channel {
     }
 }
 
-/// Values of several channels, side by side.
+/// Interleaves the values of several channels.
 fn interleave<T: Copy>(channels: &[Vec<T>], out: &mut [T]) {
     for (channel, values) in channels.iter().enumerate() {
         for (out, value) in out[channel..].iter_mut().step_by(channels.len()).zip(values) {
@@ -284,15 +298,15 @@ fn interleave<T: Copy>(channels: &[Vec<T>], out: &mut [T]) {
 }
 
 #[multiversion(targets = "simd")]
-fn scaled(values: &mut [f32], scale: f32, offset: f32) {
+fn scale_and_add(values: &mut [f32], scale: f32, offset: f32) {
     values.iter_mut().for_each(|value| *value = *value * scale + offset);
 }
 
-/// Sum of the pixels of these runs, as far as they lie in a tile of rows of `width` whose upper left pixel is pixel
-/// `origin` of the image. The order of the additions is fixed.
+/// Returns the sum of the pixels of runs inside a tile of `width` columns whose upper left pixel is pixel `origin` of
+/// the image. The order of the additions is fixed.
 #[multiversion(targets = "simd")]
 pub(crate) fn sum_over(runs: &[Run], tile: &[f32], width: usize, origin: [i64; 2]) -> f64 {
-    /// Sums that grow side by side.
+    /// Number of parallel partial sums.
     const LANES: usize = 16;
     let mut sums = [0.0_f64; LANES];
     let height = tile.len() / width;
@@ -315,21 +329,21 @@ pub(crate) fn sum_over(runs: &[Run], tile: &[f32], width: usize, origin: [i64; 2
     sums.iter().sum()
 }
 
-/// Steps of the tone curve's table: between two of them it is straight to a twentieth of an 8-bit grey level.
+/// Steps of the tone curve table: linear interpolation errs by less than a twentieth of an 8-bit grey level.
 const STEPS: usize = 4096;
 
-/// From balanced, linear grey levels of three channels to colours as microscope cameras show them: sRGB primaries and tone curve
-/// (IEC 61966-2-1).
+/// Conversion of balanced, linear grey levels of three channels to sRGB (primaries and tone curve of IEC 61966-2-1).
 struct Srgb {
     matrix: [[f32; 3]; 3],
-    inner: f32,
+    /// Factor from input grey levels to 0..1.
+    input_scale: f32,
     largest: f32,
-    /// The curve at even steps from 0 to 1, in grey levels, and once more its end.
+    /// The curve at equal steps from 0 to 1, in grey levels; the last value is repeated.
     curve: Vec<f32>,
 }
 
 impl Srgb {
-    /// `matrix` leads from the channels to linear sRGB; grey levels come with `inner_bits` and leave with `bits`.
+    /// `matrix` converts the channels to linear sRGB; input has `inner_bits`, output has `bits`.
     fn new(matrix: &[[f64; 3]; 3], inner_bits: u32, bits: u32) -> Self {
         let levels = |bits: u32| libm::exp2(f64::from(bits)) - 1.0;
         let largest = levels(bits);
@@ -337,13 +351,13 @@ impl Srgb {
             (0..=STEPS + 1).map(|step| (largest * encoded((step as f64 / STEPS as f64).min(1.0))) as f32).collect();
         Self {
             matrix: matrix.map(|row| row.map(|v| v as f32)),
-            inner: (1.0 / levels(inner_bits)) as f32,
+            input_scale: (1.0 / levels(inner_bits)) as f32,
             largest: largest as f32,
             curve,
         }
     }
 
-    /// Writes colours side by side.
+    /// Writes interleaved colours.
     fn render<T: Copy + Into<f32>, U>(&self, channels: &[Vec<T>], out: &mut [U], store: impl Fn(f32) -> U) {
         let [r, g, b] = channels else { return };
         for (((out, &r), &g), &b) in out.chunks_exact_mut(3).zip(r).zip(g).zip(b) {
@@ -353,11 +367,11 @@ impl Srgb {
         }
     }
 
-    /// Between 0 and the largest grey level.
+    /// Converts one pixel to grey levels, clamped to 0 and the highest level.
     #[inline(always)]
     fn convert(&self, levels: [f32; 3]) -> [f32; 3] {
         self.matrix.map(|row| {
-            let linear = self.inner * (row[0] * levels[0] + row[1] * levels[1] + row[2] * levels[2]);
+            let linear = self.input_scale * (row[0] * levels[0] + row[1] * levels[1] + row[2] * levels[2]);
             let at = linear.clamp(0.0, 1.0) * STEPS as f32;
             let step = at as usize;
             let (low, high) = (self.curve[step], self.curve[step + 1]);
@@ -366,7 +380,7 @@ impl Srgb {
     }
 }
 
-/// The tone curve, 0 to 1.
+/// Returns the sRGB tone curve, 0 to 1.
 fn encoded(linear: f64) -> f64 {
     if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * libm::pow(linear, 1.0 / 2.4) - 0.055 }
 }
@@ -376,7 +390,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_sum_is_that_of_the_pixels_in_the_tile() {
+    fn sum_over_adds_only_the_pixels_inside_the_tile() {
         let tile: Vec<f32> = (0..40 * 5).map(|i| i as f32 * 0.37).collect();
         let run = |y, x0, x1| Run { y, x0, x1 };
         let runs = [run(2, 0, 90), run(9, 0, 90), run(10, 25, 30), run(12, 3, 47), run(14, 59, 70), run(15, 20, 60)];

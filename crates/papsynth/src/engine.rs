@@ -6,18 +6,18 @@ use crate::error::Error;
 use crate::frame::{Finished, Frame, Plane};
 use crate::key::Key;
 use crate::model::Model;
-use crate::phantom::Studio;
-use crate::profile::{Profile, Stage, Watch};
+use crate::phantom::PhantomAssets;
+use crate::profile::{Profile, Stage, StageTimer};
 use crate::recipe::Recipe;
-use crate::render::{Desk, Rendering};
+use crate::render::{FrameBuffers, Rendering};
 use crate::scene::{self, Scene, WeightMap};
 use crate::threads::Threads;
-use crate::transmit::Lenses;
+use crate::transmit::MicroscopeCache;
 
 /// What a recipe names but does not hold.
 #[derive(Debug, Clone, Default)]
 pub struct Inputs {
-    /// The image that `layout.path` names, for [`Layout::Map`](crate::recipe::Layout::Map): brightness 0 to 1;
+    /// The image that `layout.path` names, for [`Layout::DensityMap`](crate::recipe::Layout::DensityMap): brightness 0 to 1;
     /// for [`Layout::Labels`](crate::recipe::Layout::Labels): 1 where a label lies, else 0.
     pub weight_map: Option<WeightMap>,
     /// What adds up how long the stages take.
@@ -29,10 +29,10 @@ pub struct Inputs {
 pub struct Engine {
     pub(crate) model: Model,
     weight_map: Option<WeightMap>,
-    pub(crate) studio: Studio,
-    pub(crate) lenses: Lenses,
+    pub(crate) assets: PhantomAssets,
+    pub(crate) microscopes: MicroscopeCache,
     /// Memory of finished images: as many as were ever made side by side.
-    desks: Mutex<Vec<Desk>>,
+    free_buffers: Mutex<Vec<FrameBuffers>>,
 }
 
 impl Engine {
@@ -47,21 +47,21 @@ impl Engine {
         }
         model.check()?;
         scene::check_layout(&recipe.layout, inputs.weight_map.as_ref()).map_err(Error::Layout)?;
-        let watch = Watch(inputs.profile.clone());
-        let studio = Studio::new(recipe, model, watch).map_err(Error::Model)?;
+        let timer = StageTimer(inputs.profile.clone());
+        let assets = PhantomAssets::new(recipe, model, timer).map_err(Error::Model)?;
         Ok(Self {
             model: model.clone(),
             weight_map: inputs.weight_map.clone(),
-            studio,
-            lenses: Lenses::default(),
-            desks: Mutex::default(),
+            assets,
+            microscopes: MicroscopeCache::default(),
+            free_buffers: Mutex::default(),
         })
     }
 
     /// The recipe of this engine.
     #[must_use]
     pub fn recipe(&self) -> &Recipe {
-        &self.studio.recipe
+        &self.assets.recipe
     }
 
     /// Draws what lies on the slide.
@@ -69,7 +69,7 @@ impl Engine {
     /// # Errors
     /// If the layout has no room for what is asked.
     pub fn scene(&self, key: Key) -> Result<Scene, Error> {
-        self.studio.watch.time(Stage::Scene, || scene::draw(self.recipe(), &self.model, self.weight_map.as_ref(), key))
+        self.assets.timer.time(Stage::Scene, || scene::draw(self.recipe(), &self.model, self.weight_map.as_ref(), key))
     }
 
     /// Makes an image and its truth, showing each plane as soon as it is done. Its memory is that of the next.
@@ -98,25 +98,26 @@ impl Engine {
     ) -> Result<Finished, E> {
         let index = scene.key.index;
         let fail = |cause| E::from(Error::Image { index, cause });
-        self.at_desk(|desk| {
-            let mut rendering = Rendering::new(&self.studio, &self.lenses, scene, threads, desk).map_err(fail)?;
+        self.with_buffers(|buffers| {
+            let mut rendering =
+                Rendering::new(&self.assets, &self.microscopes, scene, threads, buffers).map_err(fail)?;
             for plane in 0..rendering.planes() {
-                sink(rendering.plane(plane, desk).map_err(fail)?)?;
+                sink(rendering.plane(plane, buffers).map_err(fail)?)?;
             }
-            rendering.finish(desk).map_err(fail)
+            rendering.finish(buffers).map_err(fail)
         })
     }
 
     /// Works in the memory of finished images, and leaves it to the next one.
-    pub(crate) fn at_desk<T>(&self, work: impl FnOnce(&mut Desk) -> T) -> T {
-        let mut desk = self.desks().pop().unwrap_or_default();
-        let made = work(&mut desk);
-        self.desks().push(desk);
+    pub(crate) fn with_buffers<T>(&self, work: impl FnOnce(&mut FrameBuffers) -> T) -> T {
+        let mut buffers = self.free_buffers().pop().unwrap_or_default();
+        let made = work(&mut buffers);
+        self.free_buffers().push(buffers);
         made
     }
 
-    fn desks(&self) -> MutexGuard<'_, Vec<Desk>> {
-        self.desks.lock().unwrap_or_else(PoisonError::into_inner)
+    fn free_buffers(&self) -> MutexGuard<'_, Vec<FrameBuffers>> {
+        self.free_buffers.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Makes an image and its truth, whole.

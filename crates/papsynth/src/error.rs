@@ -248,7 +248,7 @@ pub enum Cause {
     },
     /// An object of a slide reaches too far.
     #[error(
-        "a {kind} reaches {reach_um:.0} µm at its place and depth, farther than `scan.reach_um` = {most_um}: raise that, or \
+        "a {kind} reaches {reach_um:.0} µm at its place and depth, farther than `scan.max_object_radius_um` = {most_um}: raise that, or \
          make it smaller or nearer to focus"
     )]
     TooFar {

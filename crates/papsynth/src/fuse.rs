@@ -1,13 +1,15 @@
-//! The noise of a picture that was fused of several planes: neighbouring pixels share some of it.
+//! Correlated noise of an extended-depth-of-field (EDF) image, which is fused from several planes.
 //!
-//! On the empty slide planes are fused by weights that change slowly from pixel to pixel, after filters and shifts by parts of
-//! a pixel, which leave noise correlated. Where there is structure the sharpest plane is taken, another one a few pixels on, and
-//! less is shared. What neighbours share is measured on real pictures of extended focus.
+//! On the empty slide, fusion weights change slowly from pixel to pixel, after filters and subpixel shifts, which
+//! correlates noise. In structured regions the sharpest plane changes every few pixels, and the correlation is weaker.
+//! The correlations were measured on real EDF images.
 
 use crate::scene::Fusion;
 
-/// Filters what noise has added to the expected grey levels so that neighbours correlate as they should. Its variance
-/// stays what it was, but just below the largest grey level. Grey levels and expected ones come with the first number of bits and leave with the second.
+/// Filters the noise, the difference between grey levels and expected grey levels, so that neighbours are correlated.
+///
+/// The variance of the noise is unchanged, except just below the highest grey level. Input has `bits[0]`, output
+/// `bits[1]`.
 pub(crate) fn correlate(
     grey: &mut [u16],
     expected: &mut [f32],
@@ -20,18 +22,18 @@ pub(crate) fn correlate(
     if row == 0 {
         return;
     }
-    let [before, top] = bits.map(|bits| ((1_u32 << bits.min(16)) - 1) as f32);
-    let scale = top / before;
+    let [input_top, top] = bits.map(|bits| ((1_u32 << bits.min(16)) - 1) as f32);
+    let scale = top / input_top;
     let own: Vec<f32> = grey.iter().zip(&*expected).map(|(grey, mean)| scale * (f32::from(*grey) - mean)).collect();
     expected.iter_mut().for_each(|mean| *mean *= scale);
     let expected = &*expected;
     let variance = own.iter().map(|n| f64::from(n * n)).sum::<f64>() / own.len() as f64;
-    // Rounding adds noise that neighbours do not share.
-    let diluted = 1.0 + ROUNDING / variance.max(ROUNDING);
-    let correlation = fusion.noise_correlation.map(|asked| (asked * diluted).min(MOST));
-    let [across, down] = [0, 1].map(|axis| kernel(correlation[axis], SECOND[axis]));
+    // Rounding adds uncorrelated noise.
+    let rounding_gain = 1.0 + ROUNDING / variance.max(ROUNDING);
+    let correlation = fusion.noise_correlation.map(|wanted| (wanted * rounding_gain).min(MAX_CORRELATION));
+    let [across, down] = [0, 1].map(|axis| kernel(correlation[axis], SECOND_NEIGHBOUR[axis]));
     let structure = structure(expected, width, channels);
-    let half = (HALF_ALONE * variance) as f32;
+    let half = (HALF_UNCORRELATED * variance) as f32;
     let centre = across[0] * down[0];
     let mut noise = own.clone();
     for (noise, line) in noise.chunks_exact_mut(row).zip(own.chunks_exact(row)) {
@@ -48,12 +50,12 @@ pub(crate) fn correlate(
             *value = filtered(down, |step| noise[rows[(step + 2) as usize] + x]);
         }
     }
-    // To first order this changes the correlation along the diagonals alone.
+    // To first order, this changes only the correlation along the diagonals.
     let skew = (0.5 * fusion.noise_skew) as f32;
-    // What is left of noise so many steps below the largest grey level, when planes are clipped there before they are fused.
-    let per_level = (STEPS as f64 / (REACH * (PLANE_NOISE * variance.sqrt()).max(1e-6))) as f32;
+    // Relative noise at equal steps below the highest grey level, where planes are clipped before fusion.
+    let per_level = (STEPS as f64 / (RANGE * (PLANE_NOISE * variance.sqrt()).max(1e-6))) as f32;
     let remaining: [f32; STEPS + 1] =
-        core::array::from_fn(|step| deviation_below(REACH * step as f64 / STEPS as f64) as f32);
+        core::array::from_fn(|step| clipped_normal_sd(RANGE * step as f64 / STEPS as f64) as f32);
     for (y, grey) in grey.chunks_exact_mut(row).enumerate() {
         let [above, below] = [-1, 1].map(|step| mirrored(y, step, height) * row);
         for (i, grey) in grey.iter_mut().enumerate() {
@@ -61,41 +63,47 @@ pub(crate) fn correlate(
             let [left, right] = [-1, 1].map(|step| mirrored(x, step, width) * channels + channel);
             let diagonals = shared[below + right] + shared[above + left] - shared[below + left] - shared[above + right];
             let at = y * row + i;
-            let alone = structure[at] / (structure[at] + half).max(f32::MIN_POSITIVE);
-            let rest = 1.0 - alone;
-            // The pixel's own noise is a part of what it shares, so that variances do not simply add.
-            let norm = (alone * alone + rest * rest + 2.0 * alone * rest * centre).sqrt();
+            let uncorrelated = structure[at] / (structure[at] + half).max(f32::MIN_POSITIVE);
+            let correlated = 1.0 - uncorrelated;
+            // The filtered noise includes the pixel's own noise, so the two variances do not simply add.
+            let norm =
+                (uncorrelated * uncorrelated + correlated * correlated + 2.0 * uncorrelated * correlated * centre)
+                    .sqrt();
             let step = ((top - expected[at]).max(0.0) * per_level) as usize;
-            let value = remaining[step.min(STEPS)] * (alone * own[at] + rest * (shared[at] + skew * diagonals)) / norm;
+            let value = remaining[step.min(STEPS)]
+                * (uncorrelated * own[at] + correlated * (shared[at] + skew * diagonals))
+                / norm;
             *grey = (expected[at] + value + 0.5).clamp(0.0, top) as u16;
         }
     }
 }
 
-/// Structure that has so many times the variance of noise makes half of a pixel's noise its own: fitted to how noise correlates on
-/// cytoplasm and in nuclei of real pictures of extended focus.
-const HALF_ALONE: f64 = 15.0;
+/// Variance of structure, relative to that of noise, at which half of a pixel's noise is uncorrelated: fitted to the
+/// noise on cytoplasm and nuclei of real EDF images.
+const HALF_UNCORRELATED: f64 = 15.0;
 
-/// Noise of a plane, relative to that of the picture it is fused to: fitted to how noise falls just below the largest grey level.
+/// Noise of a plane relative to that of the fused image: fitted to the decrease of noise just below the highest grey
+/// level.
 const PLANE_NOISE: f64 = 2.0;
 
-/// Steps of the table of what is left of clipped noise, and how far it reaches, in standard deviations.
+/// Number of steps of the table of clipped noise, and its range in standard deviations.
 const STEPS: usize = 64;
-const REACH: f64 = 4.0;
+const RANGE: f64 = 4.0;
 
-/// Standard deviation of the lesser of a normal deviate and `most`.
-fn deviation_below(most: f64) -> f64 {
-    let density = libm::exp(-0.5 * most * most) / (2.0 * core::f64::consts::PI).sqrt();
-    let share = 0.5 * libm::erfc(-most * core::f64::consts::FRAC_1_SQRT_2);
-    let (mean, square) = (most * (1.0 - share) - density, share - most * density + most * most * (1.0 - share));
+/// Returns the standard deviation of min(n, `max`) for a standard normal deviate n.
+fn clipped_normal_sd(max: f64) -> f64 {
+    let density = libm::exp(-0.5 * max * max) / (2.0 * core::f64::consts::PI).sqrt();
+    let below = 0.5 * libm::erfc(-max * core::f64::consts::FRAC_1_SQRT_2);
+    let (mean, square) = (max * (1.0 - below) - density, below - max * density + max * max * (1.0 - below));
     (square - mean * mean).max(0.0).sqrt()
 }
 
-/// How much there is to see about every pixel: half the mean square of differences four pixels apart, without noise.
+/// Returns the structure around every pixel: half the mean square of noise-free differences four pixels apart.
 fn structure(expected: &[f32], width: usize, channels: usize) -> Vec<f32> {
-    /// Half of the distance of what is compared, and half of the width of the mean, px.
+    /// Half of the distance of the differences, px.
     const STEP: i64 = 2;
-    const AROUND: i64 = 3;
+    /// Half of the width of the averaging window, px.
+    const WINDOW: i64 = 3;
     let row = width * channels;
     let height = expected.len() / row;
     let mut squares = vec![0.0; expected.len()];
@@ -103,49 +111,49 @@ fn structure(expected: &[f32], width: usize, channels: usize) -> Vec<f32> {
         let [above, below] = [-STEP, STEP].map(|step| mirrored(y, step, height) * row);
         for i in 0..row {
             let (x, channel) = (i / channels, i % channels);
-            let beside = |step: i64| expected[y * row + mirrored(x, step, width) * channels + channel];
-            let (dx, dy) = (beside(STEP) - beside(-STEP), expected[below + i] - expected[above + i]);
+            let at_step = |step: i64| expected[y * row + mirrored(x, step, width) * channels + channel];
+            let (dx, dy) = (at_step(STEP) - at_step(-STEP), expected[below + i] - expected[above + i]);
             squares[y * row + i] = 0.25 * (dx * dx + dy * dy);
         }
     }
-    let weight = 1.0 / (2 * AROUND + 1) as f32;
+    let weight = 1.0 / (2 * WINDOW + 1) as f32;
     let mut rows = vec![0.0; squares.len()];
     for (y, mean) in rows.chunks_exact_mut(row).enumerate() {
         for (i, mean) in mean.iter_mut().enumerate() {
             let (x, channel) = (i / channels, i % channels);
             let at = |step: i64| squares[y * row + mirrored(x, step, width) * channels + channel];
-            *mean = weight * (-AROUND..=AROUND).map(at).sum::<f32>();
+            *mean = weight * (-WINDOW..=WINDOW).map(at).sum::<f32>();
         }
     }
     for (y, mean) in squares.chunks_exact_mut(row).enumerate() {
         for (i, mean) in mean.iter_mut().enumerate() {
             let at = |step: i64| rows[mirrored(y, step, height) * row + i];
-            *mean = weight * (-AROUND..=AROUND).map(at).sum::<f32>();
+            *mean = weight * (-WINDOW..=WINDOW).map(at).sum::<f32>();
         }
     }
     squares
 }
 
-/// Variance of what rounding adds.
+/// Variance of rounding noise.
 const ROUNDING: f64 = 1.0 / 12.0;
 
-/// Largest correlation of neighbours that a filter of five values leaves.
-const MOST: f64 = 0.5;
+/// Largest correlation of neighbours that a filter of five values can produce.
+const MAX_CORRELATION: f64 = 0.5;
 
-/// A place some steps away; beyond the border the one that a mirror shows.
+/// Returns the index `step` away from `at`, mirrored at the borders.
 fn mirrored(at: usize, step: i64, count: usize) -> usize {
-    let place = (at as i64 + step).unsigned_abs();
+    let index = (at as i64 + step).unsigned_abs();
     let last = count as u64 - 1;
-    usize::try_from(if place > last { (2 * last).saturating_sub(place) } else { place }).unwrap_or(0)
+    usize::try_from(if index > last { (2 * last).saturating_sub(index) } else { index }).unwrap_or(0)
 }
 
-/// Correlation of noise two pixels apart, across and down: measured on pictures of extended focus.
-const SECOND: [f64; 2] = [-0.025, 0.01];
+/// Correlation of noise two pixels apart, in x and y: measured on EDF images.
+const SECOND_NEIGHBOUR: [f64; 2] = [-0.025, 0.01];
 
-/// The symmetric filter of five values (b, a, 1, a, b) over the root of the sum of their squares that leaves neighbours a
-/// correlation: ρ₁ = 2a(1 + b)/n, ρ₂ = (2b + a²)/n with n = 1 + 2a² + 2b². Its values from the middle on.
+/// Returns the centre and right half of the symmetric filter (b, a, 1, a, b), normalised by the root of the sum of
+/// squares, that gives these correlations: ρ₁ = 2a(1 + b)/n, ρ₂ = (2b + a²)/n with n = 1 + 2a² + 2b².
 fn kernel(correlation: f64, second: f64) -> [f32; 3] {
-    /// Steps of the fixed-point iteration: a fraction of a per mille is left after far fewer.
+    /// Steps of the fixed-point iteration, far more than convergence to a fraction of a per mille needs.
     const STEPS: usize = 60;
     let second = if correlation > 0.0 { second } else { 0.0 };
     let (mut a, mut b) = (0.0_f64, 0.0_f64);
@@ -171,8 +179,7 @@ mod tests {
 
     const WIDTH: usize = 320;
 
-    /// What is left of a camera's noise of a standard deviation, in levels of the first number of bits, on what was expected; and its
-    /// variance.
+    /// Returns correlated noise and its variance, for camera noise of standard deviation `sd` in levels of `bits[0]`.
     fn fused(expected: impl Fn(usize) -> f32, sd: f64, skew: f64, bits: [u32; 2]) -> (Vec<f64>, f64) {
         let mut rng = Key { seed: 3, index: 0 }.stream("test", 0, "noise");
         let mut expected: Vec<f32> = (0..WIDTH * 300).map(expected).collect();
@@ -185,7 +192,7 @@ mod tests {
         (noise, variance)
     }
 
-    /// Mean product of noise and that so many pixels on.
+    /// Returns the mean product of noise values `step` pixels apart.
     fn product(noise: &[f64], step: usize) -> f64 {
         let pairs = (0..noise.len() - step).filter(|i| step + 1 >= WIDTH || i % WIDTH + step < WIDTH);
         let products: Vec<f64> = pairs.map(|i| noise[i] * noise[i + step]).collect();
@@ -193,11 +200,11 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_share_as_much_noise_as_asked_and_its_variance_stays() {
+    fn noise_has_the_specified_correlation_and_the_same_variance() {
         let (noise, variance) = fused(|_| 2000.0, 30.0, 0.02, [12, 12]);
         // Some 10⁵ pixels: a standard error of .003 for each.
         assert!((variance / 900.0 - 1.0).abs() < 0.03, "{variance}");
-        for (step, wanted) in [(1, 0.2), (WIDTH, 0.4), (2, SECOND[0])] {
+        for (step, wanted) in [(1, 0.2), (WIDTH, 0.4), (2, SECOND_NEIGHBOUR[0])] {
             let found = product(&noise, step) / variance;
             assert!((found - wanted).abs() < 0.012, "{step}: {found}");
         }
@@ -206,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn where_there_is_structure_noise_is_the_cameras() {
+    fn noise_on_structure_is_uncorrelated() {
         // Waves of 1900 levels.
         let waves = |i| 2000.0 + 1900.0 * libm::sin((i % WIDTH) as f64 * 0.7) as f32;
         let (noise, variance) = fused(waves, 30.0, 0.02, [12, 12]);
@@ -216,8 +223,8 @@ mod tests {
     }
 
     #[test]
-    fn faint_noise_is_shared_too() {
-        // Noise of .9 levels of 8 bits: a filter of whole levels would be undone by rounding.
+    fn noise_below_one_grey_level_is_correlated_too() {
+        // Noise of 0.9 levels of 8 bits: rounding would undo a filter of integer levels.
         let (noise, variance) = fused(|_| 200.25 * 257.0, 0.9 * 257.0, 0.0, [16, 8]);
         assert!((variance - 0.81 - ROUNDING).abs() < 0.03, "{variance}");
         let down = product(&noise, WIDTH) / variance;
@@ -225,14 +232,14 @@ mod tests {
     }
 
     #[test]
-    fn clipped_noise_is_that_of_clipped_deviates() {
+    fn clipped_normal_sd_matches_clipped_samples() {
         let mut rng = Key { seed: 5, index: 0 }.stream("test", 0, "noise");
-        for most in [0.0, 0.9, 2.0] {
-            let drawn: Vec<f64> = (0..100_000).map(|_| random::normal(&mut rng).min(most)).collect();
+        for max in [0.0, 0.9, 2.0] {
+            let drawn: Vec<f64> = (0..100_000).map(|_| random::normal(&mut rng).min(max)).collect();
             let mean = drawn.iter().sum::<f64>() / 1e5;
             let sd = (drawn.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / 1e5).sqrt();
-            assert!((deviation_below(most) - sd).abs() < 0.01, "{most}: {sd}");
+            assert!((clipped_normal_sd(max) - sd).abs() < 0.01, "{max}: {sd}");
         }
-        assert!((deviation_below(6.0) - 1.0).abs() < 1e-6);
+        assert!((clipped_normal_sd(6.0) - 1.0).abs() < 1e-6);
     }
 }

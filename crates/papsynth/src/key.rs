@@ -5,7 +5,7 @@
 //! or the thread that makes them, changes nothing.
 
 use rand_xoshiro::Xoshiro256PlusPlus;
-use rand_xoshiro::rand_core::SeedableRng;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use sha2::{Digest, Sha256};
 
 /// The generator behind every stream: xoshiro256++, whose output is fixed by its 256-bit state alone.
@@ -13,7 +13,7 @@ pub type Stream = Xoshiro256PlusPlus;
 
 /// Version of the mapping from keys to numbers, and from numbers to images. It changes when the same recipe,
 /// model, seed and index would give another image, and is recorded with every data set.
-pub const STREAM_VERSION: u32 = 4;
+pub const STREAM_VERSION: u32 = 5;
 
 /// The [`STREAM_VERSION`] that last changed the random numbers themselves: versions since then draw the same numbers.
 const NUMBERS_VERSION: u32 = 3;
@@ -36,6 +36,14 @@ impl Key {
     /// The key of a frame of a whole slide, whose own key this is.
     pub(crate) fn frame(self, number: u32) -> Self {
         self.part(1, number)
+    }
+
+    /// Returns the key of a repeated draw of the objects of an image: attempt 0 has the streams of the image.
+    pub(crate) fn attempt(self, attempt: u32) -> Self {
+        if attempt == 0 {
+            return self;
+        }
+        Self { seed: self.stream("field", attempt.into(), "attempt").next_u64(), ..self }
     }
 
     /// The upper bit tells parts of slides from images; slides are numbered below 2³⁰.

@@ -2,7 +2,7 @@
 #![expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "pixels are f32, and the recipe's check bounds every size and place far below what an integer holds"
+    reason = "pixels are f32, and the recipe check bounds all sizes and positions far below the integer range"
 )]
 
 mod debris;

@@ -1,4 +1,4 @@
-//! Where the time goes, stage by stage.
+//! Time spent in each stage of rendering.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -7,36 +7,36 @@ use std::time::Duration;
 use crate::words::words;
 
 words! {
-    /// A stage of the way from recipe to files. Stages do not overlap.
+    /// A stage between recipe and files. Stages do not overlap.
     pub enum Stage {
-        /// Which objects there are, and where.
+        /// Drawing of the objects and their positions.
         Scene = "scene",
         /// Outlines of cells.
         Outlines = "outlines of cells",
         /// Nuclei: outline, chromatin, membrane.
         Nuclei = "nuclei",
-        /// Sheets pressed into outlines.
-        Sheets = "sheets pressed",
-        /// Sheets folded, drawn, wrinkled, stained; with the first of a field the fields that all look their texture up in.
+        /// Simulation of cytoplasm sheets pressed into their outlines.
+        Sheets = "sheets",
+        /// Folds, wrinkles, texture and stain of cytoplasm; for the first cell of a field also its noise fields.
         Cytoplasm = "cytoplasm",
-        /// Everything that is no cell.
+        /// Objects other than epithelial cells.
         Debris = "debris",
         /// Complete masks.
         Masks = "masks",
-        /// What comes through the slide, imaged.
+        /// Transmission and optics.
         Light = "light",
-        /// Light on the sensor, noise, grey levels.
+        /// Blur in the image plane, noise, grey levels.
         Camera = "camera",
-        /// Fronts and layers, rows of the table.
+        /// Visible masks, overlap counts, rows of the object table.
         Truth = "truth",
-        /// Files encoded and written.
+        /// Encoding and writing of files.
         Files = "files",
     }
 }
 
-/// Adds up how long the stages take, over all frames and threads.
+/// Adds up the time of each stage over all frames and threads.
 ///
-/// The engine has no clock of its own: the caller gives one, such as the time since the program began.
+/// The engine has no clock: the caller provides one, for example the time since program start.
 #[derive(Debug)]
 pub struct Profile {
     now: fn() -> Duration,
@@ -44,33 +44,33 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// A profile of nothing yet, by a clock that never runs backwards.
+    /// Creates an empty profile with a monotonic clock.
     #[must_use]
     pub fn new(now: fn() -> Duration) -> Self {
         Self { now, nanoseconds: Default::default() }
     }
 
-    /// Does some work, and counts its time to a stage.
+    /// Runs a function and adds its time to a stage.
     pub fn time<T>(&self, stage: Stage, work: impl FnOnce() -> T) -> T {
-        let begun = (self.now)();
-        let done = work();
-        let spent = (self.now)().saturating_sub(begun).as_nanos();
+        let start = (self.now)();
+        let result = work();
+        let spent = (self.now)().saturating_sub(start).as_nanos();
         self.nanoseconds[stage as usize].fetch_add(u64::try_from(spent).unwrap_or(u64::MAX), Ordering::Relaxed);
-        done
+        result
     }
 
-    /// What a stage took so far: the sum over all threads.
+    /// Returns the time of a stage so far, summed over all threads.
     #[must_use]
     pub fn spent(&self, stage: Stage) -> Duration {
         Duration::from_nanos(self.nanoseconds[stage as usize].load(Ordering::Relaxed))
     }
 }
 
-/// A profile, if anyone wants one.
+/// Times stages if a profile is set; otherwise only runs them.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Watch(pub(crate) Option<Arc<Profile>>);
+pub(crate) struct StageTimer(pub(crate) Option<Arc<Profile>>);
 
-impl Watch {
+impl StageTimer {
     pub(crate) fn time<T>(&self, stage: Stage, work: impl FnOnce() -> T) -> T {
         match &self.0 {
             Some(profile) => profile.time(stage, work),
@@ -84,19 +84,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_add_up_by_stage() {
+    fn time_is_added_per_stage() {
         static TICKS: AtomicU64 = AtomicU64::new(0);
         let profile = Profile::new(|| Duration::from_millis(TICKS.fetch_add(7, Ordering::Relaxed)));
         assert_eq!(profile.time(Stage::Light, || 3), 3);
         profile.time(Stage::Light, || ());
         profile.time(Stage::Files, || ());
         for stage in Stage::ALL {
-            let wanted = match stage {
+            let expected = match stage {
                 Stage::Light => 14,
                 Stage::Files => 7,
                 _ => 0,
             };
-            assert_eq!(profile.spent(stage), Duration::from_millis(wanted), "{}", stage.name());
+            assert_eq!(profile.spent(stage), Duration::from_millis(expected), "{}", stage.name());
         }
     }
 }

@@ -106,20 +106,20 @@ impl<'a> Slide<'a> {
         let key = Key { seed, index: number };
         let (population, mut empty) = Population::new(recipe, &engine.model, key).map_err(Error::Layout)?;
         empty.slide = number;
-        empty.background.illumination = empty.background.illumination.weakened(recipe.scan.shading_left);
-        let nothing = transmit::Slide { scene: &empty, phantoms: &[], threads: Threads::One };
-        let path = LightPath::new(nothing, &engine.lenses).map_err(Error::Layout)?;
-        let border_px = path.picture_reach_px() as i64;
-        let reach_px = recipe.scan.reach_um / empty.view.pixel_um;
+        empty.background.illumination = empty.background.illumination.weakened(recipe.scan.residual_shading);
+        let nothing = transmit::Specimen { scene: &empty, phantoms: &[], threads: Threads::One };
+        let path = LightPath::new(nothing, &engine.microscopes).map_err(Error::Layout)?;
+        let border_px = path.image_blur_radius_px() as i64;
+        let reach_px = recipe.scan.max_object_radius_um / empty.view.pixel_um;
         let most = (BEYOND - 1) as f64 * PLOT_PX as f64;
         if reach_px > most {
             let message = format!(
                 "{} is too far for pixels of {} µm; expected at most {:.0}",
-                recipe.scan.reach_um,
+                recipe.scan.max_object_radius_um,
                 empty.view.pixel_um,
                 most * empty.view.pixel_um
             );
-            return Err(fail("scan.reach_um", message));
+            return Err(fail("scan.max_object_radius_um", message));
         }
         Ok(Self { engine, number, population, empty, path, border_px })
     }
@@ -182,7 +182,7 @@ impl<'a> Slide<'a> {
     /// Everything that may be seen in a part of the slide, by id. No pixel is touched.
     ///
     /// # Errors
-    /// If an object reaches farther than `scan.reach_um`, or a plot holds more objects than can be numbered.
+    /// If an object reaches farther than `scan.max_object_radius_um`, or a plot holds more objects than can be numbered.
     pub fn objects(&self, origin_px: [u32; 2], size_px: [u32; 2]) -> Result<Vec<Object>, Error> {
         let low = origin_px.map(i64::from);
         let high = [0, 1].map(|axis| low[axis] + i64::from(size_px[axis]));
@@ -196,7 +196,7 @@ impl<'a> Slide<'a> {
     /// The objects that reach into a rectangle of the slide, from `low` up to `high`, their plots counted from `low`.
     fn reaching(&self, low: [i64; 2], high: [i64; 2]) -> Result<Vec<Object>, Cause> {
         let pixel_um = self.pixel_um();
-        let most_um = self.engine.recipe().scan.reach_um;
+        let most_um = self.engine.recipe().scan.max_object_radius_um;
         let halo = (most_um / pixel_um).ceil() as i64;
         let plots = |axis: usize| {
             let [first, last] = [low[axis] - halo, high[axis] - 1 + halo].map(|at| at.div_euclid(PLOT_PX));
@@ -209,7 +209,7 @@ impl<'a> Slide<'a> {
                 let plot: Arc<Vec<Object>> = self.population.plot(at)?;
                 for object in plot.iter() {
                     let reach_px = object.body.reach_um(pixel_um) / pixel_um + 3.0;
-                    let spread_px = self.path.object_reach_px(&self.empty, object.depth_um)?;
+                    let spread_px = self.path.object_blur_radius_px(&self.empty, object.depth_um)?;
                     let reach_px = reach_px + spread_px as f64;
                     if reach_px > halo as f64 {
                         let (kind, reach_um) = (object.body.kind().name(), reach_px * pixel_um);
@@ -272,18 +272,18 @@ impl<'a> Slide<'a> {
                 at >= 0.0 && at < f64::from(size_px[axis])
             })
         };
-        self.engine.at_desk(|desk| {
-            let mut rendering = Rendering::new(&self.engine.studio, &self.engine.lenses, scene, threads, desk)?;
+        self.engine.with_buffers(|buffers| {
+            let mut rendering = Rendering::new(&self.engine.assets, &self.engine.microscopes, scene, threads, buffers)?;
             let mut planes = Vec::new();
             for index in 0..rendering.planes() {
-                let plane = rendering.plane(index, desk)?;
+                let plane = rendering.plane(index, buffers)?;
                 planes.push(PartPlane {
                     stage_um: plane.stage_um,
                     grey: cut.of(&plane.grey, channels),
                     noise_free: if noise_free { cut.of(&plane.noise_free, channels) } else { Vec::new() },
                 });
             }
-            let (truth, objects) = rendering.on_slide(slide_px, within, desk);
+            let (truth, objects) = rendering.slide_truth(slide_px, within, buffers);
             let map = |group| LabelMap { width: cut.size[0], ids: cut.of(&truth.labels(group).ids, 1) };
             let labels = Group::ALL.map(map).to_vec();
             Ok(SlidePart { origin_px, size_px, planes, labels, layers: cut.of(&truth.layers(), 1), objects })

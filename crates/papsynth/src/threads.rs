@@ -1,18 +1,18 @@
-//! Work on one frame by one thread or by several, with the same results in the same order.
+//! Serial and parallel loops over the parts of one frame; both return the same results in the same order.
 
 #[cfg(feature = "threads")]
 use rayon::prelude::*;
 
-/// How many threads work on one frame. The bytes are the same.
+/// The threads that render one frame. The output does not depend on this choice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Threads {
-    /// The calling thread alone: for callers who make several frames side by side.
+    /// The calling thread only, for callers that render several frames in parallel.
     One,
-    /// All of the current rayon pool; the calling thread alone without the feature `threads`.
+    /// All threads of the current rayon pool; without the feature `threads`, the calling thread only.
     All,
 }
 
-/// Applies a function to every item; results come in the order of the items.
+/// Applies a function to every item and returns the results in the order of the items.
 pub(crate) fn map<T: Sync, R: Send>(threads: Threads, items: &[T], work: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
     match threads {
         #[cfg(feature = "threads")]
@@ -21,7 +21,7 @@ pub(crate) fn map<T: Sync, R: Send>(threads: Threads, items: &[T], work: impl Fn
     }
 }
 
-/// Applies a function to all numbers below `count` and hands over each result, in order.
+/// Applies a function to all numbers below `count` and passes each result to `visit`, in order.
 pub(crate) fn each<R: Send, E>(
     threads: Threads,
     count: usize,
@@ -29,20 +29,20 @@ pub(crate) fn each<R: Send, E>(
     mut visit: impl FnMut(usize, R) -> Result<(), E>,
 ) -> Result<(), E> {
     let numbers: Vec<usize> = (0..count).collect();
-    // One thread hands a result over while it is still in the cache; of several threads so many are in memory at one time.
+    // With one thread, each result is still in the cache when it is visited; with several, this bounds memory.
     let chunk = match threads {
         Threads::One => 1,
         Threads::All => 64,
     };
     for chunk in numbers.chunks(chunk) {
-        for (&number, made) in chunk.iter().zip(map(threads, chunk, |&number| work(number))) {
-            visit(number, made)?;
+        for (&number, result) in chunk.iter().zip(map(threads, chunk, |&number| work(number))) {
+            visit(number, result)?;
         }
     }
     Ok(())
 }
 
-/// How many items are worked on side by side.
+/// Returns the number of items that are processed in parallel.
 pub(crate) fn count(threads: Threads) -> usize {
     match threads {
         #[cfg(feature = "threads")]

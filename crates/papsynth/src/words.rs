@@ -1,6 +1,6 @@
-//! Enumerations whose values have names.
+//! A macro for enumerations whose values have names.
 
-/// Declares an enumeration whose values have names.
+/// Declares an enumeration with a name for each value.
 macro_rules! words {
     ($(#[$meta:meta])* pub enum $Name:ident { $($(#[$doc:meta])* $Word:ident = $name:literal,)* }) => {
         $(#[$meta])*
@@ -8,10 +8,10 @@ macro_rules! words {
         pub enum $Name { $($(#[$doc])* $Word,)* }
 
         impl $Name {
-            /// All of them, in their order.
+            /// All values, in order of declaration.
             pub const ALL: [Self; [$($name),*].len()] = [$(Self::$Word),*];
 
-            /// Its name.
+            /// Returns the name.
             #[must_use]
             pub fn name(self) -> &'static str {
                 match self {
@@ -19,7 +19,7 @@ macro_rules! words {
                 }
             }
 
-            /// The one of a name.
+            /// Returns the value with this name.
             #[must_use]
             pub fn by_name(name: &str) -> Option<Self> {
                 Self::ALL.into_iter().find(|word| word.name() == name)

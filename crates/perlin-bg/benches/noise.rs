@@ -1,4 +1,4 @@
-//! How long a field of 1376 x 1038 pixels takes: one octave, four octaves, a background and its logarithm.
+//! Benchmarks of a field of 1376 x 1038 pixels: one octave, four octaves, a background and its logarithm.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use perlin_bg::{Background, BackgroundParams, Fractal, FractalParams, Perlin, PerlinParams, Window};
@@ -33,7 +33,7 @@ fn bench(c: &mut Criterion) {
     group.bench_function("background, log10", |b| {
         b.iter(|| background.log10_into(black_box(&mut image), WIDTH, [0, 0]));
     });
-    group.bench_function("the paper's background, log10, set-up included", |b| {
+    group.bench_function("the paper's background, log10, including set-up", |b| {
         let params = BackgroundParams::paper();
         b.iter(|| {
             Background::new(&params, WIDTH, HEIGHT, KEY).unwrap().log10_into(black_box(&mut image), WIDTH, [0, 0]);

@@ -1,57 +1,54 @@
 use thiserror::Error;
 
-/// Why parameters were refused.
+/// Error of invalid parameters.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// One number lies outside the range its field allows.
+    /// A number is out of range.
     #[error("{field} is {value}; it must be {accepted}")]
     OutOfRange {
-        /// Path of the field, as in `noise.persistence`.
+        /// Path of the field, such as `noise.persistence`.
         field: &'static str,
-        /// What it held.
+        /// The rejected value.
         value: f64,
-        /// What would be accepted.
+        /// Description of the accepted values.
         accepted: &'static str,
     },
     /// A field of view without pixels.
-    #[error("the field of view is {width} x {height} pixels; both sides must be at least 1")]
+    #[error("the field of view is {width} x {height} pixels; width and height must be at least 1")]
     EmptyField {
-        /// Its width in pixels.
+        /// Width in pixels.
         width: usize,
-        /// Its height in pixels.
+        /// Height in pixels.
         height: usize,
     },
-    /// H(x, y) - c · I_pe(x, y) of Eq. 9 would reach zero or fall below it.
-    #[error(
-        "level {level} minus scatter.strength {strength} leaves no light; \
-         scatter.strength must be smaller than level"
-    )]
+    /// H(x, y) - c · I_pe(x, y) of Eq. 9 would be zero or negative.
+    #[error("texture.strength {strength} must be less than level {level}")]
     NoLight {
         /// The level b.
         level: f64,
-        /// The strength c of the scatter.
+        /// The strength c of the texture.
         strength: f64,
     },
-    /// The bowl falls to zero or below it somewhere in the field of view.
+    /// The illumination is zero or negative in part of the field of view.
     #[error(
-        "the bowl 1 - {x2} x² - {y2} y² with tilt [{}, {}] falls to {lowest:.3} within the field; \
-         its curvatures and tilts must leave it above zero",
+        "the illumination 1 - {falloff_x} x² - {falloff_y} y² with tilt [{}, {}] falls to {lowest:.3} in the field; \
+         reduce falloff or tilt so that it stays above 0",
         tilt[0], tilt[1]
     )]
-    DarkBowl {
-        /// Curvature along x.
-        x2: f64,
-        /// Curvature along y.
-        y2: f64,
+    NegativeIllumination {
+        /// Falloff along x.
+        falloff_x: f64,
+        /// Falloff along y.
+        falloff_y: f64,
         /// Slopes along x and y.
         tilt: [f64; 2],
-        /// The lowest value it takes.
+        /// Its lowest value.
         lowest: f64,
     },
 }
 
-/// `value`, if it is finite and `holds`.
+/// Returns `value` if it is finite and `holds` is true.
 pub(crate) fn require(field: &'static str, value: f64, holds: bool, accepted: &'static str) -> Result<f64, Error> {
     if value.is_finite() && holds { Ok(value) } else { Err(Error::OutOfRange { field, value, accepted }) }
 }

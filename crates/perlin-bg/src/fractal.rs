@@ -7,14 +7,14 @@ use portable_numerics::random::{SplitMix64, unit};
 /// Parameters of [`Fractal`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct FractalParams {
-    /// Number of layers: 1 to 32. Default: 4 (ours; the paper says "Perlin noise" and gives no number).
+    /// Number of layers, 1 to 32. Default: 4 (ours; the paper does not specify the octaves of its "Perlin noise").
     pub octaves: usize,
-    /// Amplitude of a layer over that of the coarser one before it: above 0, at most 4. With lacunarity 2 the power
-    /// spectrum falls as f^(2 log2(persistence) - 2). Default: 0.5 (ours).
+    /// Ratio of the amplitudes of a layer and the coarser one before it, above 0, at most 4. With lacunarity 2 the
+    /// power spectrum falls as f^(2 log2(persistence) - 2). Default: 0.5 (ours).
     pub persistence: f64,
-    /// Frequency of a layer over that of the one before it: from 1 to 16. Default: 2 (ours).
+    /// Ratio of the frequencies of a layer and the one before it, 1 to 16. Default: 2 (ours).
     pub lacunarity: f64,
-    /// The noise of a layer.
+    /// Noise of each layer.
     pub base: PerlinParams,
 }
 
@@ -24,10 +24,10 @@ impl Default for FractalParams {
     }
 }
 
-/// Fractal noise: layers of [`Perlin`] noise, each finer and fainter than the one before.
+/// Fractal noise: a sum of layers of [`Perlin`] noise with increasing frequency and decreasing amplitude.
 ///
-/// Positions are in cells of the coarsest layer. That layer is `Perlin::new(&params.base, key)` exactly; each further
-/// one has its own key and is shifted by part of a cell, so that the zeros of their lattices do not coincide.
+/// Positions are in cells of the coarsest layer. The coarsest layer equals `Perlin::new(&params.base, key)`. Each
+/// further layer has its own key and a shift by a fraction of a cell, so that lattice points do not coincide.
 #[derive(Debug, Clone)]
 pub struct Fractal {
     layers: Vec<Layer>,
@@ -49,10 +49,10 @@ impl Layer {
 }
 
 impl Fractal {
-    /// The noise of one `key`.
+    /// Creates the noise of a `key`.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for a parameter outside the range its field states.
+    /// [`Error::OutOfRange`] if a parameter is out of range.
     pub fn new(params: &FractalParams, key: u64) -> Result<Self, Error> {
         let FractalParams { octaves, persistence, lacunarity, ref base } = *params;
         require("octaves", octaves as f64, (1..=32).contains(&octaves), "between 1 and 32")?;
@@ -78,26 +78,27 @@ impl Fractal {
         Ok(Self { layers, bound })
     }
 
-    /// No value is larger in magnitude: √2/2 times the sum of the layers' amplitudes. Values as large as this are not
-    /// met in practice; their standard deviation is about 0.215 times the root of the sum of squared amplitudes.
+    /// Returns the bound of the noise's absolute value: √2/2 times the sum of the layers' amplitudes. Actual values
+    /// stay far below it. Their standard deviation is about 0.215 times the root of the sum of squared amplitudes.
     pub fn amplitude_bound(&self) -> f64 {
         self.bound
     }
 
-    /// The noise at one point, in cells of the coarsest layer.
+    /// Returns the noise at a point, in cells of the coarsest layer.
     pub fn at(&self, x: f64, y: f64) -> f32 {
         self.layers.iter().fold(0.0, |sum, layer| {
             sum + single(layer.amplitude) * layer.noise.at(layer.along(0, x), layer.along(1, y))
         })
     }
 
-    /// The paper's I_pe ∈ [0, 1] at one point: noise / (2 · bound) + ½ ([`UnitRange::Bound`](crate::UnitRange::Bound)).
+    /// Returns the paper's I_pe ∈ [0, 1] at a point: noise / (2 · bound) + ½
+    /// ([`UnitRange::Bound`](crate::UnitRange::Bound)).
     pub fn unit_at(&self, x: f64, y: f64) -> f32 {
         self.at(x, y) * self.unit_scale() + 0.5
     }
 
-    /// Adds `amplitude` times the noise to every pixel of `image`, at the positions that `window` gives to the pixels.
-    /// On a zeroed image with amplitude 1 the result is exactly that of [`Fractal::at`].
+    /// Adds `amplitude` times the noise to every pixel of `image`, at the pixel positions of `window`. On a zeroed
+    /// image with amplitude 1 the result equals [`Fractal::at`].
     ///
     /// # Panics
     /// If `width` is zero or does not divide the length of `image`.
@@ -106,7 +107,7 @@ impl Fractal {
         for_each_row(image, width, |r, row| rows.add_row(row, window.y(r)));
     }
 
-    /// Fills `image` with the paper's I_pe ∈ [0, 1]; the values of [`Fractal::unit_at`].
+    /// Fills `image` with the paper's I_pe ∈ [0, 1], the values of [`Fractal::unit_at`].
     ///
     /// # Panics
     /// If `width` is zero or does not divide the length of `image`.
@@ -123,7 +124,7 @@ impl Fractal {
         single(0.5 / self.bound)
     }
 
-    /// The sampler behind the images, one row at a time: a row stays in cache while its layers are added.
+    /// Returns a sampler for rows. A row stays in cache while its layers are added.
     pub(crate) fn rows(&self, width: usize, window: &Window, amplitude: f32) -> FractalRows<'_> {
         let layers = self
             .layers

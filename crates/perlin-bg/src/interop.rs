@@ -1,4 +1,4 @@
-//! Noise of this crate where `noise::NoiseFn` is expected.
+//! Implementations of `noise::NoiseFn`.
 
 use noise::NoiseFn;
 

@@ -1,15 +1,15 @@
-//! The arithmetic of one point and of one row. Both use the same expressions in the same order, so a row has the same
-//! bits as its points. Row loops are plain and vectorise by themselves; without contraction to fused multiply-add
-//! every instruction set gives the same bits.
+//! Arithmetic of points and rows. Both use the same expressions in the same order: rows and points have the same bits.
+//! Row loops vectorise automatically; without contraction to fused multiply-add every instruction set gives the same
+//! bits.
 
-/// `f64` to `f32`: the one place where precision is given up.
+/// Converts `f64` to `f32`, the only place of this rounding.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "rounding is the purpose")]
 pub(crate) fn single(value: f64) -> f32 {
     value as f32
 }
 
-/// A coordinate: its lattice cell, the offset in it (0 to 1), and the fade of that offset.
+/// A coordinate: its lattice cell, its offset in the cell (0 to 1), and the fade value of the offset.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Profile {
     pub(crate) cell: i64,
@@ -17,14 +17,14 @@ pub(crate) struct Profile {
     pub(crate) fade: f32,
 }
 
-/// The ramps of a lattice line's two gradients, blended at one column: a value, and its slope along y.
+/// Blends the ramps of two gradients on a lattice line at a column. Returns a value and its slope along y.
 #[inline(always)]
 pub(crate) fn lattice_line(offset: f32, fade: f32, left: [f32; 2], right: [f32; 2]) -> [f32; 2] {
     let (from, to) = (left[0] * offset, right[0] * (offset - 1.0));
     [from + fade * (to - from), left[1] + fade * (right[1] - left[1])]
 }
 
-/// The noise between the lattice line above a row and the one below it.
+/// Returns the noise between the lattice lines above and below a row.
 #[inline(always)]
 pub(crate) fn point(above: [f32; 2], below: [f32; 2], row: Profile) -> f32 {
     let from = above[0] + above[1] * row.offset;
@@ -32,7 +32,7 @@ pub(crate) fn point(above: [f32; 2], below: [f32; 2], row: Profile) -> f32 {
     from + row.fade * (to - from)
 }
 
-/// `row[i] += amplitude * point(above[i], below[i])`, the lines given as separate values and slopes.
+/// Computes `row[i] += amplitude * point(above[i], below[i])`. The lines are given as values and slopes.
 #[multiversion::multiversion(targets = "simd")]
 pub(crate) fn add_points(
     row: &mut [f32],
@@ -49,7 +49,7 @@ pub(crate) fn add_points(
     }
 }
 
-/// `noise * scale + offset`, in place.
+/// Computes `noise * scale + offset` in place.
 #[multiversion::multiversion(targets = "simd")]
 pub(crate) fn affine(row: &mut [f32], scale: f32, offset: f32) {
     for value in row {
@@ -57,18 +57,18 @@ pub(crate) fn affine(row: &mut [f32], scale: f32, offset: f32) {
     }
 }
 
-/// Eq. 9 along a row that holds I_pe and is left holding I_b.
+/// Converts a row of I_pe to I_b (Eq. 9).
 #[multiversion::multiversion(targets = "simd")]
 pub(crate) fn transmit(row: &mut [f32], illumination: &[f32], level: f32, strength: f32) {
-    for (value, &shade) in row.iter_mut().zip(illumination) {
+    for (value, &factor) in row.iter_mut().zip(illumination) {
         // Eq. 9: I_b = (H − c_pe · I_pe) · I_dⁿ
-        *value = (level - strength * *value) * shade;
+        *value = (level - strength * *value) * factor;
     }
 }
 
-/// Decadic logarithm of positive normal numbers, in place; relative error below 3e-7.
+/// Replaces positive normal numbers by their decadic logarithms; the relative error is below 3e-7.
 ///
-/// Own polynomial, because the standard library's differs by platform and `libm`'s does not vectorise.
+/// The standard library's logarithm differs between platforms, and that of `libm` does not vectorise.
 #[multiversion::multiversion(targets = "simd")]
 pub(crate) fn log10(row: &mut [f32]) {
     for value in row {
@@ -78,9 +78,9 @@ pub(crate) fn log10(row: &mut [f32]) {
 
 #[inline(always)]
 fn log10_of(value: f32) -> f32 {
-    /// Bits of √½: mantissas are taken from [√½, √2), where the series converges fastest.
+    /// Bits of √½: mantissas are in [√½, √2), where the series converges fastest.
     const SQRT_HALF: u32 = 0x3F35_04F3;
-    /// log10 2 in two parts, so that the product with an exponent stays exact in the first.
+    /// log10 2 in two parts: the product of an exponent with the first is exact.
     const LOG10_2_HIGH: f32 = 0.301_025_4;
     const LOG10_2_LOW: f32 = 4.605_039e-6;
     const TWICE_LOG10_E: f32 = 0.868_589;
@@ -95,10 +95,10 @@ fn log10_of(value: f32) -> f32 {
     exponent * LOG10_2_HIGH + (exponent * LOG10_2_LOW + TWICE_LOG10_E * s * series)
 }
 
-/// The smallest and largest of `row` and of the two numbers given.
+/// Returns the smallest and largest of `row`, `low` and `high`.
 #[multiversion::multiversion(targets = "simd")]
 pub(crate) fn extremes(row: &[f32], low: f32, high: f32) -> (f32, f32) {
-    /// Independent minima, because the compiler may not reorder one minimum over floats by itself.
+    /// Independent minima: the compiler may not reorder float minima.
     const LANES: usize = 16;
     let (blocks, rest) = row.as_chunks::<LANES>();
     let (mut lows, mut highs) = ([low; LANES], [high; LANES]);
@@ -126,8 +126,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn log10_follows_libm() {
-        // Steps through all exponents of normal numbers and through mantissas.
+    fn log10_matches_libm() {
+        // All exponents of normal numbers, with varying mantissas.
         let values: Vec<f32> = (0..200_001u32).map(|i| f32::from_bits(0x0080_0000 + i * 10_600)).collect();
         let mut row = values.clone();
         log10(&mut row);
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn extremes_of_any_length() {
+    fn extremes_are_correct_for_any_length() {
         for length in 0..70 {
             let row: Vec<f32> = (0..length).map(|i| ((i * 37) % 71) as f32 - 20.0).collect();
             let low = row.iter().copied().fold(5.0, f32::min);

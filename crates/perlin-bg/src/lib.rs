@@ -11,7 +11,7 @@ mod kernel;
 mod perlin;
 mod rows;
 
-pub use background::{Background, BackgroundParams, Scatter, UnitRange, stretch_to_unit};
+pub use background::{Background, BackgroundParams, BackgroundTexture, UnitRange, stretch_to_unit};
 pub use error::Error;
 pub use fractal::{Fractal, FractalParams};
 pub use illumination::Illumination;

@@ -1,17 +1,17 @@
 use crate::kernel::{add_points, lattice_line};
 use crate::perlin::Perlin;
 
-/// Which part of the plane an image shows: pixel (column, row) lies at `origin + step · (first + [column, row])`.
+/// The part of the plane that an image covers: pixel (column, row) is at `origin + step · (first + [column, row])`.
 ///
-/// Positions follow from whole pixel numbers, so two windows that differ in `first` alone agree bit for bit wherever
-/// they overlap: an image and its tiles, or the tiles of a slide of any size.
+/// Positions are computed from integer pixel numbers. Two windows that differ only in `first` agree bit for bit where
+/// they overlap, such as tiles of a slide of any size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {
     /// Position of pixel (0, 0), in lattice cells. Default: [0, 0].
     pub origin: [f64; 2],
     /// Distance between pixels, in lattice cells: 1 / (cell size in pixels). Default: 1.
     pub step: f64,
-    /// Number (column, row) of the image's first pixel. Default: [0, 0]; a tile has its own.
+    /// Number (column, row) of the image's first pixel. Default: [0, 0].
     pub first: [i64; 2],
 }
 
@@ -22,22 +22,22 @@ impl Default for Window {
 }
 
 impl Window {
-    /// The window of the plane whose lattice cells measure `cell_px` pixels, pixel (0, 0) at the position zero.
+    /// Creates a window with lattice cells of `cell_px` pixels and pixel (0, 0) at position zero.
     pub fn with_cell_px(cell_px: f64) -> Self {
         Self { step: 1.0 / cell_px, ..Self::default() }
     }
 
-    /// The same plane, seen by an image whose first pixel is number `first`.
+    /// Returns the window of a tile whose first pixel is number `first`.
     pub fn tile(self, first: [i64; 2]) -> Self {
         Self { first, ..self }
     }
 
-    /// The position of a column, in lattice cells.
+    /// Returns the position of a column, in lattice cells.
     pub fn x(&self, column: usize) -> f64 {
         self.along(0, column)
     }
 
-    /// The position of a row, in lattice cells.
+    /// Returns the position of a row, in lattice cells.
     pub fn y(&self, row: usize) -> f64 {
         self.along(1, row)
     }
@@ -49,8 +49,8 @@ impl Window {
 }
 
 impl Perlin {
-    /// Adds `amplitude` times the noise to every pixel of `image`: the value added is exactly
-    /// `amplitude * self.at(x, y)` at the positions that `window` gives to the pixels.
+    /// Adds `amplitude` times the noise to every pixel of `image`. The added value equals `amplitude * self.at(x, y)`
+    /// at the pixel positions of `window`.
     ///
     /// # Panics
     /// If `width` is zero or does not divide the length of `image`.
@@ -67,7 +67,7 @@ impl Perlin {
 pub(crate) fn for_each_row(image: &mut [f32], width: usize, mut visit: impl FnMut(usize, &mut [f32])) {
     assert!(
         width > 0 && image.len().is_multiple_of(width),
-        "width {width} must divide the image's {} pixels",
+        "the image's {} pixels are not a multiple of the width, {width}",
         image.len()
     );
     for (r, row) in image.chunks_exact_mut(width).enumerate() {
@@ -77,9 +77,9 @@ pub(crate) fn for_each_row(image: &mut [f32], width: usize, mut visit: impl FnMu
 
 /// Samples noise row by row.
 ///
-/// All that depends on the column alone is worked out once. All that depends on a lattice line is worked out once a
-/// line, as a value and a slope per column: between two lines a row is then six products and sums a pixel, whatever
-/// the size of a cell, with no gradient and no hash in sight.
+/// Terms of a column are computed once. Terms of a lattice line are computed once per line, as a value and a slope per
+/// column. A row between two lines then costs six multiply-adds per pixel for any cell size, without gradients or
+/// hashes.
 #[derive(Debug)]
 pub(crate) struct Rows<'a> {
     noise: &'a Perlin,
@@ -91,14 +91,14 @@ pub(crate) struct Rows<'a> {
     below: Line,
 }
 
-/// Neighbouring columns that share a lattice cell.
+/// Adjacent columns in one lattice cell.
 #[derive(Debug)]
 struct Run {
     cell: i64,
     end: usize,
 }
 
-/// A lattice line, sampled at every column.
+/// A lattice line sampled at every column.
 #[derive(Debug)]
 struct Line {
     number: Option<i64>,
@@ -143,7 +143,7 @@ impl<'a> Rows<'a> {
         );
     }
 
-    /// Makes `above` the lattice line `number` and `below` the next one; going down, one of them is there already.
+    /// Prepares the lattice line `number` in `above` and the next one in `below`. Downward steps reuse one of them.
     fn prepare(&mut self, number: i64) {
         let next = number.wrapping_add(1);
         if self.below.number == Some(number) {

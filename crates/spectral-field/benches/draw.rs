@@ -1,4 +1,4 @@
-//! What one draw of a 200 x 200 field costs, per spectrum and padding.
+//! Benchmarks of a draw and of a plan of a 200 x 200 field, by spectrum and padding.
 
 use std::hint::black_box;
 

@@ -1,5 +1,5 @@
-//! Draws the picture of the README: Brownian noise, the same noise thresholded, a Matérn field
-//! and low-frequency Gaussian noise. The path to write to is the only argument.
+//! Draws the image of the README: Brownian noise, the same noise thresholded, a Matérn field and low-frequency Gaussian
+//! noise. Optional argument: the output path.
 
 use image::GrayImage;
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
@@ -22,16 +22,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let panels: [Vec<f32>; 4] = [brownian, flecks, chromatin, clouds];
     let stride = SIDE + GAP;
-    let mut picture = GrayImage::from_pixel(u32::try_from(4 * stride - GAP)?, u32::try_from(SIDE)?, image::Luma([255]));
+    let mut output = GrayImage::from_pixel(u32::try_from(4 * stride - GAP)?, u32::try_from(SIDE)?, image::Luma([255]));
     for (panel, field) in panels.iter().enumerate() {
         for (i, v) in field.iter().enumerate() {
-            // 128 is the mean, 40 grey levels one standard deviation; more is darker.
+            // 128 is the mean, 40 grey levels are one standard deviation; larger values are darker.
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
             let grey = (128.0 - 40.0 * v).clamp(0.0, 255.0) as u8;
             let x = u32::try_from(panel * stride + i % SIDE)?;
-            picture.put_pixel(x, u32::try_from(i / SIDE)?, image::Luma([grey]));
+            output.put_pixel(x, u32::try_from(i / SIDE)?, image::Luma([grey]));
         }
     }
-    picture.save(path)?;
+    output.save(path)?;
     Ok(())
 }

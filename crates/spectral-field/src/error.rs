@@ -1,25 +1,25 @@
 use thiserror::Error as ThisError;
 
-/// Why a [`SpectralField`](crate::SpectralField) could not be planned.
+/// Error of invalid [`FieldParams`](crate::FieldParams).
 #[derive(Debug, Clone, PartialEq, ThisError)]
 #[non_exhaustive]
 pub enum Error {
-    /// A side of the window is zero, or the FFT grid around it would be too large.
+    /// The width or height is zero, or the FFT grid would be too large.
     #[error("{field} is {value} px; accepted: 1 to {largest}")]
     Size {
-        /// The field of [`FieldParams`](crate::FieldParams) at fault.
+        /// The invalid field of [`FieldParams`](crate::FieldParams).
         field: &'static str,
-        /// What it held.
+        /// The rejected value.
         value: usize,
         /// The largest accepted value.
         largest: usize,
     },
-    /// A number of the spectrum lies outside its range.
+    /// A parameter of the spectrum is out of range.
     #[error("{field} is {value}; accepted: {accepted}")]
     Spectrum {
-        /// The field of [`Spectrum`](crate::Spectrum) at fault.
+        /// The invalid field of [`Spectrum`](crate::Spectrum).
         field: &'static str,
-        /// What it held.
+        /// The rejected value.
         value: f64,
         /// The accepted range.
         accepted: &'static str,

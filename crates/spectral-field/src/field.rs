@@ -7,34 +7,34 @@ use rand_core::Rng;
 
 use crate::{Error, FieldParams};
 
-/// Amplitudes below this part of the largest are zero: they are lost in the rounding of the FFT,
-/// and smooth spectra then need only a corner of the grid.
+/// Amplitudes below this fraction of the largest are set to zero. They are below the rounding error of the FFT, and
+/// smooth spectra then need only a corner of the grid.
 const NEGLIGIBLE: f64 = 1e-7;
 
-/// Columns of frequencies that are transformed together: a cache line of single precision.
+/// Columns of frequencies transformed together: a cache line of single precision.
 const LANES: usize = 16;
 
-/// Rows that are transformed together: two in each lane, as real and imaginary part.
+/// Rows transformed together: two per lane, as real and imaginary part.
 const ROWS: usize = 2 * LANES;
 
-/// A complex number of each lane.
+/// A complex number per lane.
 type Lanes = fourier::Lanes<f32, LANES>;
 
-/// Gaussian random fields of one size and spectrum: planned once, drawn often.
+/// A plan for Gaussian random fields of one size and spectrum, for repeated draws.
 ///
-/// A draw colours white noise in the frequency domain: field(x) = Σ_k A_k W_k exp(2πi k·x), with
-/// A_k² the spectrum on the FFT grid, Σ A_k² = 1, and W_k independent complex normal deviates.
-/// Only half of the plane of frequencies is drawn, as the field is real.
+/// A draw filters white noise in the frequency domain: field(x) = Σ_k A_k W_k exp(2πi k·x). A_k² is the spectrum on the
+/// FFT grid with Σ A_k² = 1, and W_k are independent complex normal deviates. The field is real, so only half of the
+/// frequency plane is drawn.
 #[derive(Debug, Clone)]
 pub struct SpectralField {
     width: usize,
     height: usize,
     /// Width and height of the FFT grid.
     grid: [usize; 2],
-    /// A_k / √2 for kx = 0, 1, ... and all ky, each column of frequencies contiguous. Columns
-    /// beyond the last with an amplitude are left out.
+    /// A_k / √2 for kx = 0, 1, ... and all ky, in column-major order. Columns beyond the last non-zero amplitude are
+    /// left out.
     amplitude: Vec<f32>,
-    /// For each column, the largest |ky| with an amplitude.
+    /// Largest |ky| with a non-zero amplitude, per column.
     reach: Vec<usize>,
     columns: LaneFft<f32>,
     rows: LaneFft<f32>,
@@ -42,11 +42,11 @@ pub struct SpectralField {
 }
 
 impl SpectralField {
-    /// Plans the transforms and tabulates the amplitudes.
+    /// Plans the transforms and computes the amplitudes.
     ///
     /// # Errors
     ///
-    /// If a side is 0 or too long, or a number of the spectrum is not finite or out of range.
+    /// If a size is 0 or too large, or a parameter of the spectrum is not finite or out of range.
     pub fn new(params: &FieldParams) -> Result<Self, Error> {
         let grid = params.grid()?;
         let (amplitude, reach) = amplitudes(params, grid);
@@ -62,25 +62,25 @@ impl SpectralField {
         })
     }
 
-    /// Width of a drawn field, px.
+    /// Returns the width of a drawn field in pixels.
     #[must_use]
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Height of a drawn field, px.
+    /// Returns the height of a drawn field in pixels.
     #[must_use]
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// Width and height of the periodic grid of which a field is the upper left part, px.
+    /// Returns the width and height of the periodic grid in pixels. A field is its upper left part.
     #[must_use]
     pub fn grid(&self) -> [usize; 2] {
         self.grid
     }
 
-    /// A new field, row by row: mean 0 and variance 1 over many draws.
+    /// Draws a new field in row-major order. Mean 0 and variance 1 hold over many draws.
     #[must_use]
     pub fn draw<R: Rng + ?Sized>(&self, rng: &mut R) -> Vec<f32> {
         let mut field = vec![0.0; self.width * self.height];
@@ -88,11 +88,11 @@ impl SpectralField {
         field
     }
 
-    /// Overwrites `field`, `width` x `height` row by row, with what [`draw`](Self::draw) returns.
+    /// Overwrites `field`, `width` x `height` in row-major order, with the result of [`draw`](Self::draw).
     ///
     /// # Panics
     ///
-    /// If `field` has not `width` x `height` elements.
+    /// If `field` does not have `width` x `height` elements.
     pub fn draw_into<R: Rng + ?Sized>(&self, field: &mut [f32], rng: &mut R) {
         assert_eq!(
             field.len(),
@@ -101,65 +101,66 @@ impl SpectralField {
             self.width,
             self.height
         );
-        let spectrum = self.coloured_columns(rng);
+        let spectrum = self.filtered_columns(rng);
         let mut line = vec![ZERO; self.grid[0]];
         let mut spare = line.clone();
         for (block, rows) in field.chunks_mut(ROWS * self.width).enumerate() {
-            gather(&spectrum, self.amplitude.len() / self.grid[1], block * ROWS, &mut line);
+            pack_rows(&spectrum, self.amplitude.len() / self.grid[1], block * ROWS, &mut line);
             self.rows.process(&mut line, &mut spare);
-            scatter(&line, rows, self.width);
+            write_rows(&line, rows, self.width);
         }
     }
 
-    /// The expected product of two pixels `lag` = [x, y] px apart: the autocorrelation, wrapped
-    /// around the grid. Takes time proportional to the grid; meant for checks.
+    /// Returns the expected product of two pixels at a distance `lag` = [x, y] in pixels: the autocorrelation, periodic
+    /// in the grid. The time is proportional to the size of the grid; intended for tests.
     #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "sides are at most 2^15")]
+    #[expect(clippy::cast_precision_loss, reason = "sizes are at most 2^15")]
     pub fn autocorrelation(&self, lag: [f64; 2]) -> f64 {
         let [width, height] = self.grid;
         let mut sum = 0.0;
         for (kx, column) in self.amplitude.chunks(height).enumerate() {
             let across = TAU * lag[0] * kx as f64 / width as f64;
-            // Columns other than the two that are their own mirror images stand for two.
-            let weight = if is_own_mirror(kx, width) { 2.0 } else { 4.0 };
+            // Every column except the two self-mirrored ones also represents its mirror image.
+            let weight = if is_self_mirrored(kx, width) { 2.0 } else { 4.0 };
             for (ky, &a) in column.iter().enumerate() {
                 let a = f64::from(a);
                 let ky = if 2 * ky > height { ky as f64 - height as f64 } else { ky as f64 };
                 let along = TAU * lag[1] * ky / height as f64;
-                // cos(across + along), of which the mirrored ky cancels the odd part.
+                // cos(across + along); the mirrored ky cancels the odd part.
                 sum += weight * a * a * libm::cos(across) * libm::cos(along);
             }
         }
         sum
     }
 
-    /// The columns of frequencies, coloured and transformed along y: blocks of them side by side.
-    fn coloured_columns<R: Rng + ?Sized>(&self, rng: &mut R) -> Vec<Vec<Lanes>> {
+    /// Draws and filters the columns of frequencies and transforms them along y, in blocks.
+    fn filtered_columns<R: Rng + ?Sized>(&self, rng: &mut R) -> Vec<Vec<Lanes>> {
         #[expect(clippy::cast_possible_truncation, reason = "a constant")]
         const ROOT: f32 = SQRT_2 as f32;
         let [width, height] = self.grid;
         let mut spare = vec![ZERO; height];
         let mut blocks = Vec::new();
         for (first, reaches) in (0..).step_by(LANES).zip(self.reach.chunks(LANES)) {
-            // The inverse transform is the forward one of the reversed sequence, of which the first comes in at the end.
+            // The inverse transform equals the forward transform of the reversed sequence; its first element is at the
+            // end.
             let mut block = vec![ZERO; height + 1];
             let amplitudes = self.amplitude[first * height..].chunks(height);
             for (l, (amplitude, &reach)) in amplitudes.zip(reaches).enumerate() {
-                let mut colour = |from: usize, to: usize| {
+                let mut draw = |from: usize, to: usize| {
                     let places = block[height + 1 - to..=height - from].iter_mut().rev();
                     for (z, &a) in places.zip(&amplitude[from..to]) {
                         let [re, im] = self.normal.pair(rng);
                         (z[0][l], z[1][l]) = (a * re, a * im);
                     }
                 };
-                colour(0, reach + 1);
-                colour((reach + 1).max(height - reach), height);
+                draw(0, reach + 1);
+                draw((reach + 1).max(height - reach), height);
             }
             block.swap_remove(0);
             self.columns.process(&mut block, &mut spare);
-            for l in (0..reaches.len()).filter(|l| is_own_mirror(first + l, width)) {
-                // A real field needs a mirrored column, Z(-k) = Z*(k): the real part of its
-                // transform is that of the mirrored one, at half the variance.
+            for l in (0..reaches.len()).filter(|l| is_self_mirrored(first + l, width)) {
+                // A real field needs a self-mirrored column, Z(-k) = Z*(k). The real part of its transform is that of
+                // the mirrored column, at half the variance.
                 block.iter_mut().for_each(|z| (z[0][l], z[1][l]) = (ROOT * z[0][l], 0.0));
             }
             block.resize(height.next_multiple_of(ROWS), ZERO);
@@ -169,10 +170,10 @@ impl SpectralField {
     }
 }
 
-/// Lays spectra of rows from the `first` on, reversed, into `line`, Z = A + iB of two in each lane: one complex transform
-/// then yields two real rows. The first `columns` have a frequency.
+/// Copies the spectra of rows from `first` on to `line`, reversed, as Z = A + iB of two rows per lane: one complex
+/// transform then gives two real rows. Only the first `columns` have frequencies.
 #[multiversion(targets = "simd")]
-fn gather(spectrum: &[Vec<Lanes>], columns: usize, first: usize, line: &mut [Lanes]) {
+fn pack_rows(spectrum: &[Vec<Lanes>], columns: usize, first: usize, line: &mut [Lanes]) {
     let width = line.len();
     line.fill(ZERO);
     for (kx, block) in (0..).step_by(LANES).zip(spectrum) {
@@ -192,7 +193,7 @@ fn gather(spectrum: &[Vec<Lanes>], columns: usize, first: usize, line: &mut [Lan
                 mirrored[0][l] = a_re[i][l] + b_im[i][l];
                 mirrored[1][l] = b_re[i][l] - a_im[i][l];
             }
-            // The two are one where they have one place.
+            // Both values are equal at a shared position.
             line[kx + i] = mirrored;
             line[if kx + i == 0 { 0 } else { width - kx - i }] = z;
         }
@@ -201,7 +202,7 @@ fn gather(spectrum: &[Vec<Lanes>], columns: usize, first: usize, line: &mut [Lan
 
 /// Writes at most [`ROWS`] rows of `width`: real parts, then imaginary parts.
 #[multiversion(targets = "simd")]
-fn scatter(line: &[Lanes], rows: &mut [f32], width: usize) {
+fn write_rows(line: &[Lanes], rows: &mut [f32], width: usize) {
     let (whole, rest) = line.as_chunks();
     let mut last = [ZERO; LANES];
     last[..rest.len()].copy_from_slice(rest);
@@ -220,13 +221,13 @@ fn scatter(line: &[Lanes], rows: &mut [f32], width: usize) {
     }
 }
 
-/// Whether column kx of frequencies and column -kx are the same.
-fn is_own_mirror(kx: usize, width: usize) -> bool {
+/// Returns whether the columns kx and -kx are the same.
+fn is_self_mirrored(kx: usize, width: usize) -> bool {
     kx == 0 || 2 * kx == width
 }
 
-/// The columns of A_k / √2 with Σ A_k² = 1 over the whole plane, and how far each reaches.
-#[expect(clippy::cast_precision_loss, reason = "sides are at most 2^15")]
+/// Returns the columns of A_k / √2, with Σ A_k² = 1 over the complete plane, and the largest |ky| of each.
+#[expect(clippy::cast_precision_loss, reason = "sizes are at most 2^15")]
 fn amplitudes(params: &FieldParams, grid: [usize; 2]) -> (Vec<f32>, Vec<usize>) {
     let [width, height] = grid;
     let half = height / 2 + 1;
@@ -236,16 +237,16 @@ fn amplitudes(params: &FieldParams, grid: [usize; 2]) -> (Vec<f32>, Vec<usize>) 
         for ky in 0..half {
             let frequency = [kx as f64 / width as f64, ky as f64 / height as f64];
             let folded = params.spectrum.folded_density(frequency);
-            // The constant part of a power law is infinite, and left out.
+            // The constant part of a power law is infinite and left out.
             let s = if folded.is_finite() { folded } else { 0.0 };
-            let mirrors = |k, n| if is_own_mirror(k, n) { 1.0 } else { 2.0 };
+            let mirrors = |k, n| if is_self_mirrored(k, n) { 1.0 } else { 2.0 };
             total += mirrors(kx, width) * mirrors(ky, height) * s;
             power.push(s);
         }
     }
     let largest = power.iter().copied().fold(0.0, f64::max);
     let least = largest * NEGLIGIBLE * NEGLIGIBLE;
-    // A grid of one pixel has no frequency but the constant one.
+    // A grid of one pixel has only the constant frequency.
     let scale = if total > 0.0 { FRAC_1_SQRT_2 / total.sqrt() } else { 0.0 };
     let mut amplitude = Vec::new();
     let mut reach = Vec::new();
@@ -256,7 +257,7 @@ fn amplitudes(params: &FieldParams, grid: [usize; 2]) -> (Vec<f32>, Vec<usize>) 
         reach.push(last);
         amplitude.extend((0..height).map(|ky| {
             let s = column[ky.min(height - ky)];
-            #[expect(clippy::cast_possible_truncation, reason = "the FFT is single precision")]
+            #[expect(clippy::cast_possible_truncation, reason = "the FFT uses single precision")]
             let a = if s > least { (scale * s.sqrt()) as f32 } else { 0.0 };
             a
         }));

@@ -1,11 +1,11 @@
-//! A drawn field where `noise::NoiseFn` is expected.
+//! Implementation of `noise::NoiseFn` for a drawn field.
 
 use noise::NoiseFn;
 use rand_core::Rng;
 
 use crate::SpectralField;
 
-/// A drawn field as a function of position in px: bilinear between pixels, whose centres lie at integers, and repeated in
+/// A drawn field as a function of position in pixels: bilinear between pixel centres at integers, and periodic in
 /// both directions. Opposite edges match with [`Padding::Periodic`](crate::Padding::Periodic).
 ///
 /// ```
@@ -27,7 +27,7 @@ pub struct DrawnField {
 }
 
 impl SpectralField {
-    /// A new field as a function of position.
+    /// Draws a new field as a function of position.
     #[must_use]
     pub fn draw_noise<R: Rng + ?Sized>(&self, rng: &mut R) -> DrawnField {
         DrawnField { values: self.draw(rng), width: self.width() }
@@ -46,12 +46,12 @@ impl NoiseFn<f64, 2> for DrawnField {
     }
 }
 
-/// The pixels before and after a position, and how far it lies between them, 0 to 1.
+/// Returns the pixels before and after a position, and the fraction of the distance between them, 0 to 1.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     clippy::cast_precision_loss,
-    reason = "sides are at most 2^14, and positions are reduced to them"
+    reason = "sizes are at most 2^14, and positions are reduced to them"
 )]
 fn neighbours(position: f64, length: usize) -> (usize, usize, f64) {
     let place = position.rem_euclid(length as f64);

@@ -1,22 +1,21 @@
 use crate::{Error, Spectrum};
 
-/// The longest side of an FFT grid, 2^14 px: half a gigapixel would be a mistake, not a texture.
-const LONGEST_SIDE: usize = 1 << 14;
+/// Largest size of an FFT grid, 2^14 px.
+const MAX_SIZE: usize = 1 << 14;
 
-/// Correlation between opposite edges below which [`Padding::Decorrelated`] calls them independent.
+/// Correlation between opposite edges below which [`Padding::Decorrelated`] treats them as independent.
 const DECORRELATED: f64 = 0.01;
 
-/// What a [`SpectralField`](crate::SpectralField) draws.
+/// Parameters of a [`SpectralField`](crate::SpectralField).
 #[derive(Debug, Clone, PartialEq)]
 pub struct FieldParams {
-    /// Width of a drawn field, px, 1 to 16384. Default 256 (ours: the paper gives no size).
+    /// Width of a drawn field in pixels, 1 to 16384. Default 256 (ours: the paper gives no size).
     pub width: usize,
-    /// Height of a drawn field, px, 1 to 16384. Default 256 (ours).
+    /// Height of a drawn field in pixels, 1 to 16384. Default 256 (ours).
     pub height: usize,
-    /// How variance is spread over spatial frequencies.
-    /// Default [`Spectrum::BROWNIAN`] (the paper's, "Texture synthesis").
+    /// Power spectrum. Default [`Spectrum::BROWNIAN`] (the paper's, "Texture synthesis").
     pub spectrum: Spectrum,
-    /// Whether the field tiles. Default [`Padding::Decorrelated`] (ours).
+    /// Relation of opposite edges. Default [`Padding::Decorrelated`] (ours).
     pub padding: Padding,
 }
 
@@ -27,24 +26,24 @@ impl Default for FieldParams {
 }
 
 impl FieldParams {
-    /// The paper's Brownian noise: power falling with f², made on a grid as large as the image, so
-    /// that opposite edges match.
+    /// Returns the paper's Brownian noise: power that falls with f², on a grid as large as the image. Opposite edges
+    /// match.
     #[must_use]
     pub fn paper() -> Self {
         Self { padding: Padding::Periodic, ..Self::default() }
     }
 
-    /// The sides of the FFT grid, or the field that forbids one.
+    /// Returns the size of the FFT grid, or an error for an invalid field.
     pub(crate) fn grid(&self) -> Result<[usize; 2], Error> {
         self.spectrum.check()?;
         let side = |field, size: usize| {
-            if size == 0 || size > LONGEST_SIDE {
-                return Err(Error::Size { field, value: size, largest: LONGEST_SIDE });
+            if size == 0 || size > MAX_SIZE {
+                return Err(Error::Size { field, value: size, largest: MAX_SIZE });
             }
             let margin = match self.padding {
                 Padding::Periodic => return Ok(size),
-                Padding::Margin { px } if px > LONGEST_SIDE => {
-                    return Err(Error::Size { field: "padding.px", value: px, largest: LONGEST_SIDE });
+                Padding::Margin { px } if px > MAX_SIZE => {
+                    return Err(Error::Size { field: "padding.px", value: px, largest: MAX_SIZE });
                 }
                 Padding::Margin { px } => px,
                 Padding::Decorrelated => self.spectrum.reach_px(DECORRELATED, size),
@@ -55,24 +54,23 @@ impl FieldParams {
     }
 }
 
-/// How much of the periodic FFT grid a field shows.
+/// Relation of a field to the periodic FFT grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Padding {
-    /// All of it: the field tiles the plane, its left edge continues its right one. Sides with
-    /// large prime factors are slow.
+    /// The complete grid: opposite edges match. Sizes with large prime factors are slow.
     Periodic,
-    /// A window of it: the grid is at least `px` longer than the window in each direction, then
-    /// rounded up to a length with a fast FFT.
+    /// A window of the grid. The grid is at least `px` larger than the window in both directions, rounded up to a fast
+    /// FFT length.
     Margin {
-        /// Least distance between opposite edges across the seam, px, 0 to 16384.
+        /// Smallest distance between opposite edges across the seam in pixels, 0 to 16384.
         px: usize,
     },
-    /// A margin as long as the field remembers (autocorrelation below 0.01), at most as long as
-    /// the window. A [`Spectrum::PowerLaw`] has no such length and gets the window's own.
+    /// A margin as long as the correlation length (autocorrelation of at least 0.01), at most as long as the window. A
+    /// [`Spectrum::PowerLaw`] has no correlation length; its margin equals the window size.
     Decorrelated,
 }
 
-/// The next length of the form 2^a 3^b, even so that rows come in pairs.
+/// Returns the smallest even length 2^a 3^b of at least `least`.
 fn fast_length(least: usize) -> usize {
     let mut best = least.next_power_of_two().max(2);
     let mut threes = 3;
@@ -89,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fast_lengths() {
+    fn fast_length_is_the_smallest_possible() {
         let slow = |least: usize| {
             let threes = (0..8).map(|threes| 3_usize.pow(threes));
             let lengths = threes.flat_map(|odd| (1..13).map(move |twos| odd << twos));
@@ -101,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn paddings_and_their_grids() {
+    fn paddings_determine_the_grid() {
         let grid = |padding, spectrum| {
             let params = FieldParams { width: 200, height: 61, spectrum, padding };
             params.grid().unwrap()
@@ -116,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn impossible_sizes_are_errors() {
+    fn invalid_sizes_are_errors() {
         for (width, height, px) in [(0, 5, 0), (5, 0, 0), (1 << 20, 5, 0), (5, 5, usize::MAX)] {
             let params = FieldParams { width, height, padding: Padding::Margin { px }, ..FieldParams::default() };
             assert!(matches!(params.grid(), Err(Error::Size { .. })));

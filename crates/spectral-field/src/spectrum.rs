@@ -2,39 +2,36 @@ use core::f64::consts::{PI, TAU};
 
 use crate::Error;
 
-/// Orders of aliases summed on each side of the base band. Beyond them the folded spectrum is
-/// level, and what is left of the variance is added as a constant.
+/// Orders of aliases summed on each side of the base band. Beyond them the folded spectrum is flat; the remaining
+/// variance is added as a constant.
 const MATERN_ALIASES: i32 = 2;
 
-/// A Gaussian falls so fast that one order serves even for a blur of half a pixel.
+/// A Gaussian decays fast: one order suffices even for a blur of half a pixel.
 const GAUSSIAN_ALIASES: i32 = 1;
 
-/// How the variance of a field is spread over spatial frequencies f (cycles per pixel).
+/// The power spectrum of a field as a function of the frequency f in cycles per pixel.
 ///
-/// All are isotropic, and all fields have mean 0 and variance 1.
+/// All spectra are isotropic. All fields have mean 0 and variance 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Spectrum {
     /// S(f) ∝ f^-exponent up to the Nyquist frequency, without a constant part.
     ///
-    /// Most of the variance sits in the longest waves, so a single draw of a steep spectrum may
-    /// have a mean square far from 1: the average over draws has not.
+    /// For a steep spectrum, most of the variance is in the lowest frequencies. The mean square of a single draw may
+    /// differ much from 1; the average over draws is 1.
     PowerLaw {
-        /// 0 (white) to 8; the paper's Brownian noise has 2, a Brownian surface 3 to 4.
+        /// 0 (white) to 8. The paper's Brownian noise has 2, a Brownian surface 3 to 4.
         exponent: f64,
     },
-    /// S(f) ∝ (1 + (2π f l)² / 2ν)^-(ν + 1), the Matérn family: rough at small distances, and
-    /// forgetful beyond a few l.
+    /// S(f) ∝ (1 + (2π f l)² / 2ν)^-(ν + 1), the Matérn family: rough at small distances, uncorrelated beyond a few l.
     Matern {
-        /// Smoothness, above 0 and at most 20: 0.5 has an exponential autocorrelation, infinity
-        /// would be Gaussian.
+        /// Smoothness ν, above 0, at most 20. 0.5 gives an exponential autocorrelation, infinity a Gaussian one.
         nu: f64,
-        /// Correlation length l, px, above 0.
+        /// Correlation length l in pixels, above 0.
         length_px: f64,
     },
-    /// White noise blurred by a Gaussian, the paper's "low frequency Gaussian noise":
-    /// S(f) ∝ exp(-(2π f σ)²).
+    /// White noise blurred by a Gaussian, the paper's "low frequency Gaussian noise": S(f) ∝ exp(-(2π f σ)²).
     Gaussian {
-        /// Standard deviation σ of the blur, px, above 0.
+        /// Standard deviation σ of the blur in pixels, above 0.
         sigma_px: f64,
     },
 }
@@ -44,18 +41,17 @@ impl Spectrum {
     /// ("Texture synthesis").
     pub const BROWNIAN: Self = Self::PowerLaw { exponent: 2.0 };
 
-    /// S at a frequency in cycles per pixel, of the continuous field.
+    /// Returns S at a frequency in cycles per pixel, for the continuous field.
     ///
-    /// Matérn and Gaussian densities integrate to 1 over the plane; a power law cannot and is
-    /// given as f^-exponent.
+    /// Matérn and Gaussian densities integrate to 1 over the plane. A power law is f^-exponent, without normalisation.
     #[must_use]
     pub fn density(&self, frequency: f64) -> f64 {
         self.density_of_square(frequency * frequency)
     }
 
-    /// The autocorrelation of the continuous field at a distance in pixels, 1 at distance 0.
+    /// Returns the autocorrelation of the continuous field at a distance in pixels, 1 at distance 0.
     ///
-    /// `None` for a power law, whose autocorrelation depends on the size of its grid: ask
+    /// `None` for a power law, whose autocorrelation depends on the grid: use
     /// [`SpectralField::autocorrelation`](crate::SpectralField::autocorrelation).
     #[must_use]
     pub fn autocorrelation(&self, lag_px: f64) -> Option<f64> {
@@ -96,11 +92,11 @@ impl Spectrum {
         }
     }
 
-    /// The density of the field sampled at pixels: S folded into the base band, so that the
-    /// samples have exactly the continuous autocorrelation at whole-pixel distances.
+    /// Returns the density of the field sampled at pixels: S folded into the base band. The samples have the exact
+    /// continuous autocorrelation at integer distances.
     pub(crate) fn folded_density(&self, frequency: [f64; 2]) -> f64 {
         let orders = match self {
-            // Has no scale of its own: it is defined by its grid and ends at Nyquist.
+            // A power law has no scale: its grid defines it, and it ends at the Nyquist frequency.
             Self::PowerLaw { .. } => 0,
             Self::Matern { .. } => MATERN_ALIASES,
             Self::Gaussian { .. } => GAUSSIAN_ALIASES,
@@ -117,17 +113,17 @@ impl Spectrum {
         sum + self.variance_beyond_square(side * side / PI)
     }
 
-    /// The least distance in pixels at which the autocorrelation is below `level`, at most `most`.
+    /// Returns the smallest distance in pixels at which the autocorrelation is below `level`, at most `most`.
     pub(crate) fn reach_px(&self, level: f64, most: usize) -> usize {
         #[expect(clippy::cast_precision_loss, reason = "at most 2^14")]
-        let remembers = |lag: usize| self.autocorrelation(lag as f64).is_none_or(|c| c >= level);
+        let is_correlated = |lag: usize| self.autocorrelation(lag as f64).is_none_or(|c| c >= level);
         let (mut near, mut far) = (0, most);
         while far - near > 1 {
-            let middle = usize::midpoint(near, far);
-            if remembers(middle) {
-                near = middle;
+            let centre = usize::midpoint(near, far);
+            if is_correlated(centre) {
+                near = centre;
             } else {
-                far = middle;
+                far = centre;
             }
         }
         far
@@ -147,7 +143,7 @@ impl Spectrum {
         }
     }
 
-    /// The part of the variance at frequencies whose square exceeds `square`.
+    /// Returns the variance at frequencies whose square exceeds `square`.
     fn variance_beyond_square(&self, square: f64) -> f64 {
         match *self {
             Self::PowerLaw { .. } => 0.0,
@@ -160,14 +156,13 @@ impl Spectrum {
     }
 }
 
-/// x^-p, multiplied out for whole and half p, which are the common ones and make a table of
-/// amplitudes ten times cheaper.
+/// Returns x^-p. Integer and half-integer p, the common ones, use multiplications, which is ten times faster.
 fn inverse_power(x: f64, p: f64) -> f64 {
     let halves = 2.0 * p;
     if halves != libm::floor(halves) {
         return libm::pow(x, -p);
     }
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "whole, 0 to 42")]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an integer from 0 to 42")]
     let mut exponent = halves as u32;
     let (mut base, mut power) = (1.0 / x.sqrt(), 1.0);
     while exponent > 0 {
@@ -180,10 +175,10 @@ fn inverse_power(x: f64, p: f64) -> f64 {
     power
 }
 
-/// The modified Bessel function of the second kind, K_ν(x) = ∫₀^∞ exp(-x cosh t) cosh(ν t) dt.
+/// Returns the modified Bessel function of the second kind, K_ν(x) = ∫₀^∞ exp(-x cosh t) cosh(ν t) dt.
 ///
-/// The trapezoidal rule converges exponentially on this integrand, which falls doubly
-/// exponentially (Trefethen and Weideman, doi:10.1137/130932132).
+/// The trapezoidal rule converges exponentially on this integrand, which decays doubly exponentially (Trefethen and
+/// Weideman, doi:10.1137/130932132).
 fn bessel_k(nu: f64, x: f64) -> f64 {
     // Error about exp(-2π · π/2 / STEP).
     const STEP: f64 = 0.125;
@@ -196,7 +191,7 @@ fn bessel_k(nu: f64, x: f64) -> f64 {
     loop {
         let next = term(t);
         sum += next;
-        // Past the peak at sinh t = ν / x the terms only fall.
+        // Beyond the peak at sinh t = ν / x the terms decrease.
         if x * libm::sinh(t) > nu && next <= f64::EPSILON * sum {
             return STEP * sum;
         }
@@ -222,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn matern_of_one_half_is_exponential() {
+    fn matern_with_nu_one_half_is_exponential() {
         let spectrum = Spectrum::Matern { nu: 0.5, length_px: 3.0 };
         for r in [0.0, 1e-200, 0.5, 1.0, 7.0, 40.0] {
             let c = spectrum.autocorrelation(r).unwrap();
@@ -231,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn whole_and_half_powers_are_powers() {
+    fn integer_and_half_integer_powers_are_correct() {
         for p in [0.5, 1.0, 1.5, 2.0, 3.5, 21.0, 1.3] {
             for x in [1.0, 1.7, 100.0] {
                 let expected = libm::pow(x, -p);
@@ -252,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn impossible_numbers_are_errors() {
+    fn out_of_range_values_are_errors() {
         for bad in [f64::NAN, f64::INFINITY, -1.0] {
             let (power, gaussian) = (Spectrum::PowerLaw { exponent: bad }, Spectrum::Gaussian { sigma_px: bad });
             let (rough, short) =

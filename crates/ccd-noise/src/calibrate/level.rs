@@ -1,58 +1,59 @@
-//! What the frames of one level of light say.
+//! Statistics of the frames of one light level.
 
 use crate::error::{Error, require};
 
-/// Whether flats are taken to be lit evenly.
+/// Treatment of uneven illumination in flats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shading {
-    /// They are: all that differs between pixels is the camera's. EMVA 1288 demands it of the laboratory.
+    /// Flats are evenly lit: every difference between pixels belongs to the camera. EMVA 1288 requires even light.
     Kept,
-    /// They are not, as through a microscope: from each pixel the mean of a square around it is taken away before
-    /// their spread is measured. Pixels nearer to the border than half a side are left out.
+    /// Flats are unevenly lit, as through a microscope. The mean of a square around each pixel is subtracted before the
+    /// spatial variance is computed. Pixels closer than half a side to the border are left out.
     Removed {
         /// Side of the square in pixels, odd, from 3 to below the width and height of the frames.
         side_px: usize,
     },
 }
 
-/// How much light frames were taken in.
+/// Amount of light of the frames of a level.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Light {
-    /// None: the shutter closed, the exposure as long as that of the others.
+pub enum LightLevel {
+    /// Dark frames: closed shutter, same exposure time as the other levels.
     Dark,
-    /// Some.
+    /// An unknown amount of light.
     Unknown,
-    /// This much in some unit, above 0, as brightness times time: it tells how straight the response is.
+    /// Amount in any unit, above 0, such as brightness times exposure time. It gives the linearity error.
     Relative(f64),
-    /// This many photons on average on a pixel, above 0: it tells the quantum efficiency too.
+    /// Mean number of photons per pixel, above 0. It also gives the quantum efficiency.
     Photons(f64),
 }
 
 /// A point of the photon transfer curve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Level {
-    /// The light.
-    pub light: Light,
-    /// How many frames it is measured on.
+    /// Amount of light.
+    pub light: LightLevel,
+    /// Number of frames.
     pub frames: usize,
     /// Mean grey level.
     pub mean_dn: f64,
-    /// Variance in time, from the differences of frames; that of their means is taken off.
+    /// Temporal variance, from differences of frames. Fluctuation of the frame means is subtracted.
     pub variance_dn2: f64,
-    /// Variance over the pixels of their means in time; what the noise in time adds is taken off, so that it may be below 0.
+    /// Spatial variance of the pixels' temporal means. The contribution of temporal noise is subtracted; the result may
+    /// be negative.
     pub spatial_dn2: f64,
-    /// The share of pixels at the highest level.
+    /// Fraction of pixels at the highest grey level.
     pub at_highest: f64,
-    /// The share of pixels at level 0.
+    /// Fraction of pixels at level 0.
     pub at_zero: f64,
 }
 
-/// What two or more frames of one size say, whose highest possible level is `highest`.
+/// Measures two or more frames of equal size. `highest` is the highest possible grey level.
 pub(super) fn measure(
     frames: &[&[u16]],
     width: usize,
     highest: u16,
-    light: Light,
+    light: LightLevel,
     shading: Shading,
 ) -> Result<Level, Error> {
     let (count, pixels) = (frames.len() as f64, frames[0].len() as f64);
@@ -69,7 +70,7 @@ pub(super) fn measure(
         require("frames", largest.into(), largest <= highest, "from 0 to 2^bit_depth - 1")?;
         means.push(sum as f64 / pixels);
     }
-    // Frame by frame around its own mean, so that a lamp that flickers adds no noise.
+    // Deviations from the mean of each frame, so that lamp flicker adds no noise.
     let mut mean_image = vec![0.0; frames[0].len()];
     let mut squares = vec![0.0; frames[0].len()];
     for (frame, mean) in frames.iter().zip(&means) {
@@ -85,27 +86,27 @@ pub(super) fn measure(
         *sum /= count;
     }
     variance /= pixels * (count - 1.0);
-    let spread = match shading {
+    let spatial = match shading {
         Shading::Kept => mean_image.iter().map(|v| v * v).sum::<f64>() / (pixels - 1.0).max(1.0),
-        Shading::Removed { side_px } => spread_without_shading(&mean_image, width, side_px),
+        Shading::Removed { side_px } => variance_without_shading(&mean_image, width, side_px),
     };
     Ok(Level {
         light,
         frames: frames.len(),
         mean_dn: means.iter().sum::<f64>() / count,
         variance_dn2: variance,
-        spatial_dn2: spread - variance / count,
+        spatial_dn2: spatial - variance / count,
         at_highest: at_highest as f64 / (count * pixels),
         at_zero: at_zero as f64 / (count * pixels),
     })
 }
 
-/// The mean square of what remains of an image of mean 0 after the mean of a square around each pixel is taken away, and
-/// divided by what remains of white noise, 1 - 1/side².
-fn spread_without_shading(image: &[f64], width: usize, side: usize) -> f64 {
+/// Returns the variance of an image of mean 0 after subtraction of the mean of a square around each pixel. The result is
+/// divided by 1 - 1/side², the variance that remains of white noise.
+fn variance_without_shading(image: &[f64], width: usize, side: usize) -> f64 {
     let (height, around) = (image.len() / width, side / 2);
     let area = (side * side) as f64;
-    // Sums over `side` rows, moved down a row at a time.
+    // Sums over `side` rows, updated row by row.
     let mut columns = vec![0.0; width];
     let (mut squares, mut count) = (0.0, 0.0);
     for y in 0..height {
@@ -115,11 +116,11 @@ fn spread_without_shading(image: &[f64], width: usize, side: usize) -> f64 {
         if y + 1 < side {
             continue;
         }
-        let middle = &image[(y - around) * width..][..width];
+        let centre = &image[(y - around) * width..][..width];
         let mut sum = columns[..side - 1].iter().sum::<f64>();
         for x in around..width - around {
             sum += columns[x + around];
-            let rest = middle[x] - sum / area;
+            let rest = centre[x] - sum / area;
             squares += rest * rest;
             count += 1.0;
             sum -= columns[x - around];
@@ -136,7 +137,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn shading_is_removed_as_by_hand() {
+    fn shading_removal_matches_direct_computation() {
         let (width, height, side) = (23_usize, 17_usize, 5_usize);
         let image: Vec<f64> = (0..width * height).map(|i| ((i * 7919) % 101) as f64 - 50.0 + i as f64).collect();
         let (mut squares, mut count) = (0.0, 0.0);
@@ -149,7 +150,7 @@ mod tests {
             }
         }
         let expected = squares / count / (1.0 - 1.0 / 25.0);
-        let got = spread_without_shading(&image, width, side);
+        let got = variance_without_shading(&image, width, side);
         assert!((got / expected - 1.0).abs() < 1e-12, "{got} {expected}");
     }
 }

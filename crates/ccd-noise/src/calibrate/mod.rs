@@ -1,23 +1,24 @@
-//! Photon transfer: what a camera is, from its flat frames.
+//! Photon transfer: measures the parameters of a camera from its flat frames.
 
 mod level;
 
-pub use level::{Level, Light, Shading};
+pub use level::{Level, LightLevel, Shading};
 
 use crate::camera::ROUNDING;
 use crate::error::{Error, require, within};
 use crate::{CameraParams, ReadNoise};
 use level::measure;
 
-/// How flat frames are judged.
+/// Parameters of a photon transfer measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationParams {
-    /// Bits of the levels, 8 to 16. Default 16, ours.
+    /// Bit depth of the frames, 8 to 16. Default 16, ours.
     pub bit_depth: u32,
-    /// Whether flats are lit evenly. Default removed with squares of 15 pixels, ours: few microscopes light evenly.
+    /// Treatment of uneven illumination. Default: removed with squares of 15 pixels, ours, because few microscopes
+    /// light evenly.
     pub shading: Shading,
-    /// The share of saturation up to which gain and responsivity are fitted, above 0, at most 1. Default 0.7, that
-    /// of EMVA 1288.
+    /// Fraction of saturation up to which gain and responsivity are fitted, above 0, at most 1. Default 0.7, that of
+    /// EMVA 1288.
     pub fit_to: f64,
 }
 
@@ -27,11 +28,11 @@ impl Default for CalibrationParams {
     }
 }
 
-/// Gathers levels of light, dark among them, and gives the camera that took them.
+/// Collects levels of light, including dark ones, and computes the parameters of the camera.
 ///
-/// EMVA 1288, release 4.0 linear. The noise in time of a level comes from the differences of its frames, which are free of the
-/// fixed pattern; of their mean image, whose spread is the pattern, the noise that remains is taken off. Frames are
-/// needed for one level at a time.
+/// EMVA 1288, release 4.0 linear. Temporal noise comes from differences of frames, which cancel the fixed pattern. The
+/// fixed pattern is the spatial variance of the mean frame; the remaining temporal noise is subtracted. Only the frames
+/// of one level are in memory at a time.
 #[derive(Debug, Clone)]
 pub struct PhotonTransfer {
     params: CalibrationParams,
@@ -39,91 +40,92 @@ pub struct PhotonTransfer {
     levels: Vec<Level>,
 }
 
-/// Where the variance is largest, beyond which pixels or the converter saturate.
+/// The saturation point of EMVA 1288: the level of maximum temporal variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Saturation {
-    /// It was reached.
+    /// The saturation point was measured.
     Reached {
-        /// Mean above the dark, in grey levels.
+        /// Mean grey level above dark.
         dn: f64,
-        /// The same in electrons.
+        /// Saturation capacity in electrons, dark signal excluded.
         e: f64,
     },
-    /// The brightest level was still below.
-    Above {
-        /// Its mean above the dark, in grey levels.
+    /// Saturation was not reached. The brightest level is a lower bound.
+    NotReached {
+        /// Mean grey level of the brightest level above dark.
         dn: f64,
-        /// The same in electrons.
+        /// The same in electrons, dark signal excluded.
         e: f64,
     },
 }
 
-/// What photon transfer measures.
+/// Results of photon transfer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
-    /// Overall system gain K in grey levels per electron: the slope of variance over mean, both above the dark's.
+    /// Overall system gain K in grey levels per electron: the slope of variance against mean, both above dark.
     pub gain_dn_per_e: f64,
-    /// Mean grey level in the dark.
+    /// Mean dark grey level.
     pub offset_dn: f64,
-    /// Noise in the dark in electrons, σ_d: of reading and of the dark current's shots, without that of rounding.
+    /// Dark noise σ_d in electrons: read noise and shot noise of the dark current, without quantisation noise.
     pub dark_noise_e: f64,
-    /// Standard deviation of the pixels' offsets in electrons.
+    /// DSNU: standard deviation of the pixels' offsets in electrons.
     pub dsnu_e: f64,
-    /// Standard deviation of the pixels' responses as a share of their mean.
+    /// PRNU: standard deviation of the pixels' responses as a fraction of their mean.
     pub prnu: f64,
-    /// Where the camera saturates.
+    /// Saturation point.
     pub saturation: Saturation,
     /// Electrons per photon, if the photons of the levels are known.
     pub quantum_efficiency: Option<f64>,
-    /// The largest deviation from a straight line between 5 % and 95 % of saturation, or up to the brightest level where
-    /// it is not reached, as a share, if the light of three such levels is known.
+    /// Largest relative deviation from a straight line, if the light of at least three levels is known. The fit covers
+    /// 5 % to 95 % of saturation, or up to the brightest level if saturation is not reached.
     pub linearity_error: Option<f64>,
-    /// Bits of the levels.
+    /// Bit depth of the frames.
     pub bit_depth: u32,
-    /// The points it is measured on, the dark one first, then from dark to bright.
+    /// Measured levels: the dark level, then the others from dark to bright.
     pub levels: Vec<Level>,
 }
 
-/// Beyond this share of pixels at the highest level a flat is saturated (EMVA 1288: 0.1 to 0.2 %).
+/// A flat is saturated if more than this fraction of pixels is at the highest level (EMVA 1288: 0.1 to 0.2 %).
 const SATURATED: f64 = 0.002;
 
-/// Below this share of the largest variance, that of the brightest level has fallen: no noise of the measurement does that.
+/// Saturation is reached if the brightest level's variance is below this fraction of the maximum. Measurement noise is
+/// smaller.
 const FALLEN: f64 = 0.8;
 
-/// Beyond this share of pixels at level 0 a dark frame is cut off (EMVA 1288: 0.5 %).
-const CUT_OFF: f64 = 0.005;
+/// A dark frame is clipped if more than this fraction of pixels is at level 0 (EMVA 1288: 0.5 %).
+const DARK_CLIPPED: f64 = 0.005;
 
 impl PhotonTransfer {
-    /// Checks the parameters.
+    /// Creates an empty measurement from validated parameters.
     ///
     /// # Errors
     ///
-    /// If a field lies outside its range.
+    /// If a field is out of range.
     pub fn new(params: &CalibrationParams) -> Result<Self, Error> {
         within("bit_depth", params.bit_depth.into(), 8.0..=16.0, "from 8 to 16")?;
         require("fit_to", params.fit_to, params.fit_to > 0.0 && params.fit_to <= 1.0, "above 0 and at most 1")?;
         if let Shading::Removed { side_px } = params.shading {
             let odd = side_px >= 3 && !side_px.is_multiple_of(2);
-            require("shading.side_px", side_px as f64, odd, "odd and 3 or more")?;
+            require("shading.side_px", side_px as f64, odd, "an odd number of at least 3")?;
         }
         Ok(Self { params: params.clone(), size: None, levels: Vec::new() })
     }
 
-    /// Adds a level: two or more `frames` under the same `light`, in rows of `width` pixels.
+    /// Adds a level: two or more `frames` with the same `light`, in rows of `width` pixels.
     ///
-    /// Two frames of many levels give the gain; many frames, say 64, of the dark and of one level near half of saturation
-    /// give the fixed pattern. Saturated levels are welcome, as they tell where saturation is.
+    /// Two frames at many levels give the gain. Many frames, such as 64, of the dark level and of one level near half
+    /// of saturation give the fixed pattern. Saturated levels give the saturation point.
     ///
     /// # Errors
     ///
-    /// If there are fewer than two frames, they differ in size from others, hold numbers beyond the bit depth, or are
-    /// dark ones cut off at 0.
-    pub fn add(&mut self, frames: &[&[u16]], width: usize, light: Light) -> Result<&Level, Error> {
+    /// If there are fewer than two frames, frames differ in size, values exceed the bit depth, or dark frames are
+    /// clipped at 0.
+    pub fn add(&mut self, frames: &[&[u16]], width: usize, light: LightLevel) -> Result<&Level, Error> {
         if frames.len() < 2 {
-            return Err(Error::TooFew { what: "frames of a level", found: frames.len(), needed: 2 });
+            return Err(Error::TooFew { what: "frames in this level", found: frames.len(), needed: 2 });
         }
-        if let Light::Photons(amount) | Light::Relative(amount) = light {
-            require("light", amount, amount > 0.0, "above 0; darkness is a kind of its own")?;
+        if let LightLevel::Photons(amount) | LightLevel::Relative(amount) = light {
+            require("light", amount, amount > 0.0, "above 0 (use LightLevel::Dark for dark frames)")?;
         }
         let size = |frame: &[u16]| [width, frame.len().checked_div(width).unwrap_or(0)];
         let expected = self.size.unwrap_or_else(|| size(frames[0]));
@@ -135,26 +137,26 @@ impl PhotonTransfer {
         }
         if let Shading::Removed { side_px } = self.params.shading {
             let smaller = side_px < expected[0] && side_px < expected[1];
-            require("shading.side_px", side_px as f64, smaller, "below the width and height of the frames")?;
+            require("shading.side_px", side_px as f64, smaller, "less than the width and height of the frames")?;
         }
         let level = measure(frames, width, self.highest(), light, self.params.shading)?;
-        if light == Light::Dark && level.at_zero > CUT_OFF {
-            return Err(Error::CutOff { share: level.at_zero });
+        if light == LightLevel::Dark && level.at_zero > DARK_CLIPPED {
+            return Err(Error::DarkClipped { fraction: level.at_zero });
         }
         self.size = Some(expected);
         self.levels.push(level);
         Ok(&self.levels[self.levels.len() - 1])
     }
 
-    /// The camera behind the levels added so far.
+    /// Computes the parameters of the camera from the levels added so far.
     ///
     /// # Errors
     ///
-    /// If there is no dark level, no other, none that is not saturated, or if they are all alike.
+    /// If there is no dark level, no other level, no unsaturated level, or no increase of mean and variance with light.
     pub fn calibration(&self) -> Result<Calibration, Error> {
-        let dark = self.levels.iter().filter(|level| level.light == Light::Dark).max_by_key(|level| level.frames);
+        let dark = self.levels.iter().filter(|level| level.light == LightLevel::Dark).max_by_key(|level| level.frames);
         let dark = dark.ok_or(Error::NoDark)?;
-        let mut flats: Vec<&Level> = self.levels.iter().filter(|level| level.light != Light::Dark).collect();
+        let mut flats: Vec<&Level> = self.levels.iter().filter(|level| level.light != LightLevel::Dark).collect();
         flats.sort_by(|a, b| a.mean_dn.total_cmp(&b.mean_dn));
         let Some(brightest) = flats.last() else {
             return Err(Error::TooFew { what: "levels with light", found: 0, needed: 1 });
@@ -175,10 +177,10 @@ impl PhotonTransfer {
         let transfer = fitted.iter().map(|level| (above(level), level.variance_dn2 - dark.variance_dn2));
         let gain = through_origin(transfer);
         if fitted.is_empty() && open.iter().any(|level| above(level) > 0.0) {
-            return Err(Error::TooFew { what: "levels with light below fit_to of saturation", found: 0, needed: 1 });
+            return Err(Error::TooFew { what: "levels with light up to `fit_to` of saturation", found: 0, needed: 1 });
         }
         if !(gain.is_finite() && gain > 0.0) {
-            return Err(Error::Alike { above_dark_dn: above(open[open.len() - 1]) });
+            return Err(Error::NoResponse { above_dark_dn: above(open[open.len() - 1]) });
         }
         let half = 0.5 * if reached { noisiest } else { f64::from(highest) - dark.mean_dn };
         let photons = amounts(&fitted, dark, photons);
@@ -187,7 +189,7 @@ impl PhotonTransfer {
         let saturation = if reached {
             Saturation::Reached { dn: noisiest, e: noisiest / gain }
         } else {
-            Saturation::Above { dn: above(brightest), e: above(brightest) / gain }
+            Saturation::NotReached { dn: above(brightest), e: above(brightest) / gain }
         };
         Ok(Calibration {
             gain_dn_per_e: gain,
@@ -208,7 +210,7 @@ impl PhotonTransfer {
     }
 }
 
-/// The spread of responses, from the level with the most frames and of these the one nearest to `half` of saturation.
+/// Returns the PRNU from the level with the most frames; of several, from the one nearest to `half` of saturation.
 fn prnu(flats: &[&Level], dark: &Level, half: f64) -> f64 {
     let above = |level: &Level| level.mean_dn - dark.mean_dn;
     let from_half = |level: &Level| (above(level) - half).abs();
@@ -216,44 +218,45 @@ fn prnu(flats: &[&Level], dark: &Level, half: f64) -> f64 {
     level.map_or(0.0, |level| root(level.spatial_dn2 - dark.spatial_dn2) / above(level))
 }
 
-/// How far levels of known light, all in photons or all in another unit, are from a straight line.
+/// Returns the linearity error if every level has an amount of light in the same unit.
 fn linearity_error(flats: &[&Level], dark: &Level) -> Option<f64> {
-    let relative = |light| if let Light::Relative(amount) = light { Some(amount) } else { None };
+    let relative = |light| if let LightLevel::Relative(amount) = light { Some(amount) } else { None };
     let points = amounts(flats, dark, photons).or_else(|| amounts(flats, dark, relative))?;
     largest_deviation(&points)
 }
 
-fn photons(light: Light) -> Option<f64> {
-    if let Light::Photons(amount) = light { Some(amount) } else { None }
+fn photons(light: LightLevel) -> Option<f64> {
+    if let LightLevel::Photons(amount) = light { Some(amount) } else { None }
 }
 
-/// The mean above the dark over the amount of light, if every level has one.
-fn amounts(flats: &[&Level], dark: &Level, amount: impl Fn(Light) -> Option<f64>) -> Option<Vec<(f64, f64)>> {
+/// Returns (amount of light, mean above dark) of each level, or `None` if an amount is missing.
+fn amounts(flats: &[&Level], dark: &Level, amount: impl Fn(LightLevel) -> Option<f64>) -> Option<Vec<(f64, f64)>> {
     flats.iter().map(|level| Some((amount(level.light)?, level.mean_dn - dark.mean_dn))).collect()
 }
 
-/// 0 where noise has made a variance negative.
+/// Returns the square root, or 0 if noise has made a variance negative.
 fn root(variance: f64) -> f64 {
     variance.max(0.0).sqrt()
 }
 
 impl Calibration {
-    /// A camera like the one measured, with a fixed pattern of its own that `serial` chooses.
+    /// Returns parameters of a camera with the measured values. `serial` selects its fixed pattern.
     ///
-    /// What is not measured is that of [`CameraParams::default`]: the quantum efficiency where no photons were given, and
-    /// the dark current, 0, whose mean and noise are in the offset and the read noise. Where the converter saturates
-    /// before the pixels, or nothing did, they are given 2 % more room than the converter.
+    /// Unmeasured values are those of [`CameraParams::default`]: the quantum efficiency without known photons, and a
+    /// dark current of 0. Mean and noise of the dark current are part of the offset and the read noise. If the
+    /// converter saturates first, or saturation was not reached, the full-well capacity is 2 % above the converter's
+    /// range.
     #[must_use]
     pub fn camera(&self, serial: u64) -> CameraParams {
-        /// By how much a pixel that never was full may hold more than the converter shows.
-        const ROOM: f64 = 1.02;
+        /// Full-well capacity over converter range, if the full-well capacity was not reached.
+        const HEADROOM: f64 = 1.02;
         let default = CameraParams::default();
         let highest = libm::exp2(f64::from(self.bit_depth)) - 1.0;
         let brightest = self.levels.iter().map(|level| level.mean_dn).fold(0.0, f64::max);
         let clipped = self.levels.iter().any(|level| level.at_highest > SATURATED);
         let full_dn = match self.saturation {
             Saturation::Reached { .. } if !clipped => brightest - self.offset_dn,
-            _ => ROOM * (highest - self.offset_dn),
+            _ => HEADROOM * (highest - self.offset_dn),
         };
         CameraParams {
             quantum_efficiency: self.quantum_efficiency.map_or(default.quantum_efficiency, |qe| qe.min(1.0)),
@@ -270,19 +273,19 @@ impl Calibration {
     }
 }
 
-/// The slope of the line through the origin with the least sum of squares.
+/// Returns the slope of the least-squares line through the origin.
 fn through_origin(points: impl IntoIterator<Item = (f64, f64)>) -> f64 {
     let [xy, xx] = points.into_iter().fold([0.0; 2], |[xy, xx], (x, y)| [xy + x * y, xx + x * x]);
     xy / xx
 }
 
-/// The largest deviation, as a share of the line's value, from the line with the least sum of squares of such
-/// deviations, of three points or more.
+/// Returns the largest relative deviation from the line of least squared relative deviations, or `None` for fewer than
+/// three points.
 fn largest_deviation(points: &[(f64, f64)]) -> Option<f64> {
     if points.len() < 3 {
         return None;
     }
-    // Weights 1/y², by which the sums of squares are of shares.
+    // Weights 1/y², so that the squared deviations are relative.
     let [mut w, mut wx, mut wy, mut wxx, mut wxy] = [0.0; 5];
     for &(x, y) in points {
         let weight = 1.0 / (y * y);

@@ -1,6 +1,6 @@
-//! The laws of EMVA 1288's linear camera, and whether photon transfer finds it again.
+//! Tests of the linear camera of EMVA 1288, and of photon transfer on simulated frames.
 
-use ccd_noise::calibrate::{Calibration, CalibrationParams, Light, PhotonTransfer, Saturation, Shading};
+use ccd_noise::calibrate::{Calibration, CalibrationParams, LightLevel, PhotonTransfer, Saturation, Shading};
 use ccd_noise::{Binning, Blooming, Camera, CameraParams, Error, PhotonNoise, ReadNoise, SaturatedRun};
 
 const KEY: u64 = 0x00e1_ec72_0000_1288;
@@ -27,7 +27,7 @@ fn levels(frame: &[u16]) -> Vec<f64> {
     frame.iter().copied().map(f64::from).collect()
 }
 
-/// `flats` levels of two frames each up to `brightest` of saturation, and `frames` of the dark and of half.
+/// Calibrates on `flats` levels of two frames each, up to `brightest` of saturation, and `frames` of dark and of half.
 fn measure(params: &CameraParams, shading: Shading, flats: u32, brightest: f64, frames: u64) -> Calibration {
     let camera = Camera::new(params).unwrap();
     let mut transfer = PhotonTransfer::new(&CalibrationParams {
@@ -37,13 +37,15 @@ fn measure(params: &CameraParams, shading: Shading, flats: u32, brightest: f64, 
     })
     .unwrap();
     let mut key = KEY;
-    let mut add = |share: f64, frames: u64| {
-        let electrons = share * camera.saturation_e();
+    let mut add = |fraction: f64, frames: u64| {
+        let electrons = fraction * camera.saturation_capacity_e();
         let frames: Vec<Vec<u16>> = (key..key + frames).map(|key| flat(&camera, electrons, key)).collect();
         key += 1000;
         let frames: Vec<&[u16]> = frames.iter().map(Vec::as_slice).collect();
         let photons = electrons / params.quantum_efficiency;
-        transfer.add(&frames, WIDTH, if share > 0.0 { Light::Photons(photons) } else { Light::Dark }).unwrap();
+        transfer
+            .add(&frames, WIDTH, if fraction > 0.0 { LightLevel::Photons(photons) } else { LightLevel::Dark })
+            .unwrap();
     };
     add(0.0, frames);
     for level in 1..=flats {
@@ -57,13 +59,13 @@ fn assert_within(what: &str, found: f64, expected: f64, tolerance: f64) {
     assert!((found / expected - 1.0).abs() < tolerance, "{what}: found {found}, expected {expected}");
 }
 
-/// Whether the converter is at its highest level before a pixel is full.
+/// Returns whether the converter reaches its highest level below the full-well capacity.
 fn is_limited_by_converter(params: &CameraParams) -> bool {
     params.offset_dn + params.gain_dn_per_e * params.full_well_e >= libm::exp2(f64::from(params.bit_depth)) - 1.0
 }
 
 #[test]
-fn photon_transfer_finds_the_camera_again() {
+fn photon_transfer_recovers_the_camera() {
     for params in [CameraParams::orca_05g(), CameraParams::scmos()] {
         let found = measure(&params, Shading::Kept, 50, 1.05, 64);
         let dark_noise = (params.read_noise.rms_e() * params.read_noise.rms_e() + params.dark_e()).sqrt();
@@ -75,44 +77,44 @@ fn photon_transfer_finds_the_camera_again() {
         let offset = params.offset_dn + params.gain_dn_per_e * params.dark_e();
         assert!((found.offset_dn - offset).abs() < 0.03, "{}", found.offset_dn);
         assert!(found.linearity_error.unwrap() < 0.002, "{:?}", found.linearity_error);
-        // By definition it is where clipping begins to take from the variance, 2 to 6 % early.
+        // The variance maximum lies 2 to 6 % below saturation, where clipping begins to reduce the variance.
         let Saturation::Reached { e, .. } = found.saturation else { panic!("{:?}", found.saturation) };
         let camera = Camera::new(&params).unwrap();
-        assert_within("saturation", e, 0.96 * camera.saturation_e(), 0.03);
-        // A camera made from it is the same again.
+        assert_within("saturation", e, 0.96 * camera.saturation_capacity_e(), 0.03);
+        // A camera with the measured parameters gives the same measurement.
         let copy = found.camera(7);
         assert!(is_limited_by_converter(&copy) && copy.serial == 7);
         assert_within("full well", copy.full_well_e, params.full_well_e, 0.02);
         let again = measure(&copy, Shading::Kept, 12, 1.05, 8);
-        assert_within("gain, again", again.gain_dn_per_e, params.gain_dn_per_e, 0.02);
-        assert_within("PRNU, again", again.prnu, params.prnu, 0.03);
+        assert_within("gain, copy", again.gain_dn_per_e, params.gain_dn_per_e, 0.02);
+        assert_within("PRNU, copy", again.prnu, params.prnu, 0.03);
     }
 }
 
 #[test]
-fn few_flats_below_saturation_do() {
+fn few_flats_below_saturation_suffice() {
     let params = CameraParams::orca_05g();
     let found = measure(&params, Shading::Removed { side_px: 15 }, 3, 0.8, 8);
     assert_within("gain", found.gain_dn_per_e, params.gain_dn_per_e, 0.01);
     assert_within("DSNU", found.dsnu_e, params.dsnu_e, 0.03);
     assert_within("PRNU", found.prnu, params.prnu, 0.03);
-    let Saturation::Above { e, .. } = found.saturation else { panic!("{:?}", found.saturation) };
-    assert_within("brightest", e, 0.8 * Camera::new(&params).unwrap().saturation_e(), 0.01);
+    let Saturation::NotReached { e, .. } = found.saturation else { panic!("{:?}", found.saturation) };
+    assert_within("brightest", e, 0.8 * Camera::new(&params).unwrap().saturation_capacity_e(), 0.01);
     assert!(is_limited_by_converter(&found.camera(1)));
 }
 
-/// Exposure times tell how straight the response is, though not how many photons there were.
+/// Relative exposure gives linearity, but not quantum efficiency.
 #[test]
-fn relative_light_gives_linearity_alone() {
+fn relative_light_gives_linearity_only() {
     let camera = Camera::new(&CameraParams::orca_05g()).unwrap();
     let params = CalibrationParams { bit_depth: 12, ..CalibrationParams::default() };
-    // The second camera gathers less the more there is.
+    // The second camera has a nonlinear response.
     for (bend, least, most) in [(0.0, 0.0, 0.003), (0.03, 0.005, 0.05)] {
         let mut transfer = PhotonTransfer::new(&params).unwrap();
         for step in 0..5_u32 {
             let time = f64::from(step);
             let frames = [0, 1].map(|i| flat(&camera, 3e3 * time * (1.0 - bend * time), u64::from(2 * step + i)));
-            let light = if step > 0 { Light::Relative(time) } else { Light::Dark };
+            let light = if step > 0 { LightLevel::Relative(time) } else { LightLevel::Dark };
             transfer.add(&[&frames[0], &frames[1]], WIDTH, light).unwrap();
         }
         let found = transfer.calibration().unwrap();
@@ -122,9 +124,9 @@ fn relative_light_gives_linearity_alone() {
     }
 }
 
-/// The well clips first: the brightest level is flat.
+/// The full well clips below the converter range: the brightest level has no noise.
 #[test]
-fn a_full_well_is_found() {
+fn full_well_capacity_is_measured() {
     let params = CameraParams { full_well_e: 9_000.0, ..CameraParams::orca_05g() };
     let found = measure(&params, Shading::Kept, 20, 1.3, 4);
     assert!(matches!(found.saturation, Saturation::Reached { .. }), "{:?}", found.saturation);
@@ -133,15 +135,15 @@ fn a_full_well_is_found() {
 }
 
 #[test]
-fn shading_is_no_pattern() {
+fn shading_is_not_counted_as_prnu() {
     let params = CameraParams::orca_05g();
     let camera = Camera::new(&params).unwrap();
     let light: Vec<f32> = (0..PIXELS).map(|i| 8e3 * (1.0 - 0.2 * (i % WIDTH) as f32 / WIDTH as f32)).collect();
     for (shading, least, most) in [(Shading::Removed { side_px: 11 }, 0.97, 1.03), (Shading::Kept, 5.0, 20.0)] {
         let params = CalibrationParams { bit_depth: 12, shading, ..CalibrationParams::default() };
         let mut transfer = PhotonTransfer::new(&params).unwrap();
-        for (share, kind, keys) in [(0.0, Light::Dark, 0..16), (1.0, Light::Unknown, 16..32)] {
-            let light: Vec<f32> = light.iter().map(|e| share * e).collect();
+        for (fraction, kind, keys) in [(0.0, LightLevel::Dark, 0..16), (1.0, LightLevel::Unknown, 16..32)] {
+            let light: Vec<f32> = light.iter().map(|e| fraction * e).collect();
             let frames: Vec<Vec<u16>> = keys
                 .map(|key| {
                     let mut out = vec![0; PIXELS];
@@ -160,67 +162,79 @@ fn shading_is_no_pattern() {
 }
 
 #[test]
-fn frames_that_say_nothing_are_refused() {
+fn unusable_frames_are_rejected() {
     let params = CalibrationParams { bit_depth: 8, shading: Shading::Kept, ..CalibrationParams::default() };
     let fresh = || PhotonTransfer::new(&params).unwrap();
-    let says = |error: Error, words: &str| assert!(error.to_string().contains(words), "{error}");
+    let assert_message = |error: Error, words: &str| assert!(error.to_string().contains(words), "{error}");
     let (dark, lit, full) = ([10, 12, 11, 9], [50, 61, 55, 48], [255; 4]);
     let (dark_2, lit_2) = ([11, 10, 12, 10], [58, 49, 51, 57]);
 
     let mut transfer = fresh();
-    says(transfer.add(&[&dark], 2, Light::Dark).unwrap_err(), "1 frames of a level; 2 or more");
-    says(transfer.add(&[&dark, &dark[..2]], 2, Light::Dark).unwrap_err(), "2 x 1 pixels (2 in all)");
-    says(transfer.add(&[&dark, &dark], 3, Light::Dark).unwrap_err(), "3 x 1 pixels (4 in all)");
-    says(transfer.add(&[&dark, &dark], 0, Light::Dark).unwrap_err(), "0 x 0");
-    says(
-        transfer.add(&[&dark, &[300; 4]], 2, Light::Dark).unwrap_err(),
+    assert_message(
+        transfer.add(&[&dark], 2, LightLevel::Dark).unwrap_err(),
+        "too few frames in this level: 1, expected at least 2",
+    );
+    assert_message(transfer.add(&[&dark, &dark[..2]], 2, LightLevel::Dark).unwrap_err(), "2 x 1 pixels (2 in total)");
+    assert_message(transfer.add(&[&dark, &dark], 3, LightLevel::Dark).unwrap_err(), "3 x 1 pixels (4 in total)");
+    assert_message(transfer.add(&[&dark, &dark], 0, LightLevel::Dark).unwrap_err(), "0 x 0");
+    assert_message(
+        transfer.add(&[&dark, &[300; 4]], 2, LightLevel::Dark).unwrap_err(),
         "frames is 300; it must be from 0 to 2^bit_depth",
     );
-    says(transfer.add(&[&dark, &[0; 4]], 2, Light::Dark).unwrap_err(), "50.0 % of the dark frames' pixels are at 0");
-    says(transfer.add(&[&lit, &lit], 2, Light::Photons(0.0)).unwrap_err(), "light is 0");
-    says(transfer.calibration().unwrap_err(), "no dark frames");
-    // A refused frame does not decide about the size of the next.
-    transfer.add(&[&dark, &dark_2], 2, Light::Dark).unwrap();
-    says(
-        transfer.add(&[&lit, &lit_2], 4, Light::Unknown).unwrap_err(),
-        "4 x 1 pixels (4 in all); the frames before it",
+    assert_message(
+        transfer.add(&[&dark, &[0; 4]], 2, LightLevel::Dark).unwrap_err(),
+        "50.0 % of the dark frames' pixels are at 0",
     );
-    says(transfer.calibration().unwrap_err(), "0 levels with light");
-    transfer.add(&[&full, &full], 2, Light::Unknown).unwrap();
-    says(transfer.calibration().unwrap_err(), "all 1 levels of flats are saturated");
-    let mut alike = fresh();
-    alike.add(&[&dark, &dark_2], 2, Light::Dark).unwrap();
-    alike.add(&[&dark, &dark_2], 2, Light::Unknown).unwrap();
-    says(alike.calibration().unwrap_err(), "all alike");
-    alike.add(&[&lit, &lit_2], 2, Light::Unknown).unwrap();
-    alike.calibration().unwrap();
-    // What is left after a saturated level is too bright for the fit.
+    assert_message(transfer.add(&[&lit, &lit], 2, LightLevel::Photons(0.0)).unwrap_err(), "light is 0");
+    assert_message(transfer.calibration().unwrap_err(), "no dark frames");
+    // A rejected frame does not set the expected size.
+    transfer.add(&[&dark, &dark_2], 2, LightLevel::Dark).unwrap();
+    assert_message(
+        transfer.add(&[&lit, &lit_2], 4, LightLevel::Unknown).unwrap_err(),
+        "4 x 1 pixels (4 in total), but the previous frames",
+    );
+    assert_message(transfer.calibration().unwrap_err(), "too few levels with light: 0");
+    transfer.add(&[&full, &full], 2, LightLevel::Unknown).unwrap();
+    assert_message(transfer.calibration().unwrap_err(), "all levels of flats are saturated (1 in total)");
+    let mut unchanged = fresh();
+    unchanged.add(&[&dark, &dark_2], 2, LightLevel::Dark).unwrap();
+    unchanged.add(&[&dark, &dark_2], 2, LightLevel::Unknown).unwrap();
+    assert_message(unchanged.calibration().unwrap_err(), "do not increase with light");
+    unchanged.add(&[&lit, &lit_2], 2, LightLevel::Unknown).unwrap();
+    unchanged.calibration().unwrap();
+    // The only unsaturated level is too bright for the fit.
     let mut bright = fresh();
-    bright.add(&[&dark, &dark_2], 2, Light::Dark).unwrap();
-    bright.add(&[&[200, 190, 210, 205], &[190, 212, 190, 225]], 2, Light::Unknown).unwrap();
-    bright.add(&[&full, &full], 2, Light::Unknown).unwrap();
-    says(bright.calibration().unwrap_err(), "0 levels with light below fit_to of saturation; 1 or more are needed");
+    bright.add(&[&dark, &dark_2], 2, LightLevel::Dark).unwrap();
+    bright.add(&[&[200, 190, 210, 205], &[190, 212, 190, 225]], 2, LightLevel::Unknown).unwrap();
+    bright.add(&[&full, &full], 2, LightLevel::Unknown).unwrap();
+    assert_message(
+        bright.calibration().unwrap_err(),
+        "too few levels with light up to `fit_to` of saturation: 0, expected at least 1",
+    );
 
     for (params, field) in [
         (CalibrationParams { bit_depth: 17, ..params.clone() }, "bit_depth"),
         (CalibrationParams { fit_to: f64::NAN, ..params.clone() }, "fit_to"),
         (CalibrationParams { shading: Shading::Removed { side_px: 4 }, ..params.clone() }, "shading.side_px"),
     ] {
-        says(PhotonTransfer::new(&params).unwrap_err(), field);
+        assert_message(PhotonTransfer::new(&params).unwrap_err(), field);
     }
     let mut small = PhotonTransfer::new(&CalibrationParams::default()).unwrap();
-    says(small.add(&[&dark, &dark], 2, Light::Dark).unwrap_err(), "shading.side_px is 15; it must be below the width");
+    assert_message(
+        small.add(&[&dark, &dark], 2, LightLevel::Dark).unwrap_err(),
+        "shading.side_px is 15; it must be less than the width",
+    );
 }
 
 #[test]
-fn the_paper_says_how_flats_are_judged() {
+fn default_fit_range_is_that_of_emva_1288() {
     let params = CalibrationParams::default();
     assert_eq!((params.fit_to, params.bit_depth), (0.7, 16));
 }
 
-/// What [`Camera`] predicts is what its frames have, in time and over the pixels.
+/// Measured temporal noise and spatial nonuniformity equal the predictions of [`Camera`].
 #[test]
-fn noise_and_pattern_are_those_predicted() {
+fn noise_and_nonuniformity_match_predictions() {
     for photon_noise in [PhotonNoise::Exact, PhotonNoise::NormalAbove { mean_e: 300.0 }, PhotonNoise::Off] {
         let params = CameraParams {
             photon_noise,
@@ -236,26 +250,26 @@ fn noise_and_pattern_are_those_predicted() {
             let n = PIXELS as f64;
             let difference: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a - b).collect();
             let in_time = (variance(&difference) / 2.0).sqrt();
-            // The squares of log-normal read noise spread widely: 1 %.
-            assert_within("in time", in_time, camera.noise_dn(electrons), 0.01);
+            // The variance of log-normal read noise converges slowly, therefore 1 %.
+            assert_within("in time", in_time, camera.temporal_noise_dn(electrons), 0.01);
             let mean_image: Vec<f64> = a.iter().zip(&b).map(|(a, b)| (a + b) / 2.0).collect();
             let over_pixels = (variance(&mean_image) - in_time * in_time / 2.0).sqrt();
-            assert_within("over pixels", over_pixels, camera.pattern_dn(electrons), 0.03);
-            let spread = (camera.noise_dn(electrons), camera.pattern_dn(electrons));
+            assert_within("over pixels", over_pixels, camera.nonuniformity_dn(electrons), 0.03);
+            let spread = (camera.temporal_noise_dn(electrons), camera.nonuniformity_dn(electrons));
             let z =
                 (mean(&a) - camera.expected_dn(electrons)) / ((spread.0 * spread.0 + spread.1 * spread.1) / n).sqrt();
             assert!(z.abs() < 4.0, "{photon_noise:?}, {electrons}: {z} standard errors");
             let mut expected = [0.0];
-            #[expect(clippy::cast_possible_truncation, reason = "pixels are single precision")]
+            #[expect(clippy::cast_possible_truncation, reason = "frames take single precision")]
             camera.mean_dn_into(&[electrons as f32], &mut expected);
             assert!((f64::from(expected[0]) - camera.expected_dn(electrons)).abs() < 0.01);
         }
     }
 }
 
-/// Shot noise alone: SNR = √µ.
+/// With shot noise only, SNR = √µ.
 #[test]
-fn the_signal_to_noise_ratio_is_the_root() {
+fn shot_noise_limited_snr_is_the_square_root() {
     let params = CameraParams {
         read_noise: ReadNoise::Same { e: 0.0 },
         gain_dn_per_e: 3.0,
@@ -269,9 +283,9 @@ fn the_signal_to_noise_ratio_is_the_root() {
     }
 }
 
-/// The pattern belongs to the camera and the place; the noise to the frame.
+/// The fixed pattern depends on the camera and the pixel, the noise on the frame.
 #[test]
-fn the_pattern_is_the_cameras() {
+fn fixed_pattern_depends_on_the_serial_number() {
     let params = CameraParams { photon_noise: PhotonNoise::Off, prnu: 0.05, dsnu_e: 30.0, ..CameraParams::scmos() };
     let quiet = CameraParams { read_noise: ReadNoise::Same { e: 0.0 }, ..params.clone() };
     let camera = Camera::new(&quiet).unwrap();
@@ -292,7 +306,7 @@ fn the_pattern_is_the_cameras() {
     let noise = levels(&flat(&even, 5e3, quiet.serial));
     assert!(correlation(&levels(&frame), &noise).abs() < bound);
 
-    // Read noise: the same median and root mean square over the pixels as asked for.
+    // Read noise has the specified median and root mean square over pixels.
     let frames: Vec<Vec<f64>> = (0..64).map(|key| levels(&flat(&even, 5e3, key))).collect();
     let mut deviations: Vec<f64> = (0..PIXELS)
         .map(|i| variance(&frames.iter().map(|f| f[i]).collect::<Vec<_>>()) * 64.0 / 63.0 - 1.0 / 12.0)
@@ -304,9 +318,9 @@ fn the_pattern_is_the_cameras() {
     assert_within("median", deviations[PIXELS / 2], 1.0, 0.02);
 }
 
-/// Windows of an uneven camera, and the runs of its saturated pixels.
+/// Windows of a camera with a fixed pattern, and the runs of its saturated pixels.
 #[test]
-fn windows_and_runs_agree_with_the_frame() {
+fn windows_and_saturated_runs_match_the_frame() {
     let (width, height) = (301, 40);
     let electrons: Vec<f32> =
         (0..width * height).map(|i| [100.0, 9e3, 17_400.0, 17_650.0, 3e4][i * i / 3 % 5]).collect();
@@ -324,7 +338,7 @@ fn windows_and_runs_agree_with_the_frame() {
             runs.iter().flat_map(|r| (r.x0..r.x1).map(|x| (r.y as usize - 1000) * width + x as usize - 40)).collect();
         assert_eq!(marked.len(), count);
         let highest: Vec<usize> = (0..frame.len()).filter(|&i| frame[i] == camera.max_dn()).collect();
-        assert_eq!(marked, highest, "the converter is at its top before a pixel is full");
+        assert_eq!(marked, highest, "the converter saturates before the full well");
         for (left, top, columns, rows) in [(0, 0, 64, 7), (63, 7, 238, 33), (170, 3, 1, 20)] {
             let cut = |i: usize| (top + i / columns) * width + left + i % columns;
             let tile: Vec<f32> = (0..rows * columns).map(|i| electrons[cut(i)]).collect();
@@ -337,7 +351,7 @@ fn windows_and_runs_agree_with_the_frame() {
 }
 
 #[test]
-fn blooming_moves_charge_and_loses_none() {
+fn blooming_conserves_charge() {
     let (width, height) = (96_usize, 200_usize);
     let mut electrons = vec![2_000.0; width * height];
     for y in 95..105 {
@@ -362,16 +376,16 @@ fn blooming_moves_charge_and_loses_none() {
             assert_eq!(marked, exposure.saturated);
             (frame, exposure, runs)
         };
-        // A well that nothing fills shows the charges as they were gathered.
-        let (gathered, none, _) = expose(Blooming::On { vertical: 1.0, anti_blooming: 0.0 }, 1e6);
+        // A full well that is never reached gives the collected charge.
+        let (collected, none, _) = expose(Blooming::On { vertical: 1.0, anti_blooming: 0.0 }, 1e6);
         assert_eq!((none.saturated, none.drained_e, none.escaped_e), (0, 0, 0));
         for vertical in [1.0, 0.95] {
             let (bloomed, all, runs) = expose(Blooming::On { vertical, anti_blooming: 0.0 }, 18_000.0);
-            assert_eq!((sum(&bloomed), all.drained_e, all.escaped_e), (sum(&gathered), 0, 0));
+            assert_eq!((sum(&bloomed), all.drained_e, all.escaped_e), (sum(&collected), 0, 0));
             assert!(bloomed.iter().all(|&dn| dn <= 18_000));
             assert!(all.saturated > 80 && runs.iter().any(|r| r.y < 90) && runs.iter().any(|r| r.y > 110));
             let (drained, part, _) = expose(Blooming::On { vertical, anti_blooming: 0.6 }, 18_000.0);
-            assert_eq!(sum(&drained) + part.drained_e + part.escaped_e, sum(&gathered));
+            assert_eq!(sum(&drained) + part.drained_e + part.escaped_e, sum(&collected));
             assert!(part.drained_e > 0 && (80..all.saturated).contains(&part.saturated));
         }
         let (clipped, off, runs) = expose(Blooming::Off, 18_000.0);
@@ -383,9 +397,9 @@ fn blooming_moves_charge_and_loses_none() {
     }
 }
 
-/// Where nothing is full, blooming changes nothing.
+/// Blooming does not change frames without full pixels.
 #[test]
-fn blooming_leaves_the_rest_alone() {
+fn blooming_does_not_change_unsaturated_frames() {
     for params in [CameraParams::default(), CameraParams::orca_05g(), CameraParams::scmos()] {
         let camera = Camera::new(&params).unwrap();
         let blooming = Blooming::On { vertical: 0.95, anti_blooming: 0.0 };
@@ -399,7 +413,7 @@ fn blooming_leaves_the_rest_alone() {
 }
 
 #[test]
-fn a_binned_camera_is_its_pixels_together() {
+fn binned_camera_matches_binned_frames() {
     let params = CameraParams {
         dark_current_e_per_s: 500.0,
         exposure_s: 0.2,
@@ -411,7 +425,7 @@ fn a_binned_camera_is_its_pixels_together() {
     let camera = Camera::new(&params).unwrap();
     let side = 2;
     let digital = Camera::new(&params.binned(Binning::Digital { side }).unwrap()).unwrap();
-    // Pixel by pixel: averages of four levels, rounded, of two frames.
+    // Reference: rounded averages of four pixels in two frames.
     let electrons = 2_000.0;
     let average = |key: u64| -> Vec<f64> {
         let frame = levels(&flat(&camera, electrons, key));
@@ -428,10 +442,10 @@ fn a_binned_camera_is_its_pixels_together() {
     };
     let slow = statistics(&average(1), &average(2));
     let fast = statistics(&levels(&flat(&digital, 4.0 * electrons, 3)), &levels(&flat(&digital, 4.0 * electrons, 4)));
-    // Rounding up of halves, of four possible fractions, adds 1/8 of a level to the slow mean.
+    // Rounding of halves upwards, in one of four cases, adds 1/8 of a level to the mean of the reference.
     assert!((fast.0 + 0.125 - slow.0).abs() < 0.1, "{fast:?} {slow:?}");
     assert_within("in time", fast.1, slow.1, 0.02);
-    assert_within("in time, predicted", digital.noise_dn(4.0 * electrons), slow.1, 0.02);
+    assert_within("in time, predicted", digital.temporal_noise_dn(4.0 * electrons), slow.1, 0.02);
     assert_within("over pixels", fast.2, slow.2, 0.03);
 
     let charge = params.binned(Binning::Charge { side }).unwrap();
@@ -449,12 +463,12 @@ fn a_binned_camera_is_its_pixels_together() {
         assert!(error.starts_with("binning.side is "), "{error}");
     }
     let electrons: Vec<f32> = (0..5 * 7).map(|i| i as f32).collect();
-    let (binned, width) = Binning::Charge { side }.gather(&electrons, 5);
+    let (binned, width) = Binning::Charge { side }.sum_electrons(&electrons, 5);
     assert_eq!((width, binned.len()), (2, 6));
     assert_eq!(binned[..3], [0.0 + 1.0 + 5.0 + 6.0, 2.0 + 3.0 + 7.0 + 8.0, 10.0 + 11.0 + 15.0 + 16.0]);
 }
 
-/// The same bytes on every machine, fixed pattern and blooming included.
+/// Pins the output bytes, with fixed pattern and blooming.
 #[test]
 fn bits_are_pinned() {
     let electrons: Vec<f32> = (0..301 * 57).map(|i| [0.0, 2.0, 19.0, 300.0, 500.0, 14e3, 4e4][i * i / 3 % 7]).collect();

@@ -1,4 +1,4 @@
-//! What JPEG leaves: by the book, by another program, and by its own laws.
+//! Tests of JPEG against ITU-T T.81, against another program, and of invariants.
 
 use ccd_noise::{Jpeg, JpegParams, NoiseField, Subsampling};
 
@@ -9,10 +9,10 @@ fn jpeg(quality: u32, subsampling: Subsampling) -> Jpeg {
 }
 
 fn grey(quality: u32) -> Jpeg {
-    jpeg(quality, Subsampling::Full)
+    jpeg(quality, Subsampling::S444)
 }
 
-/// A smooth ground with a spot, and noise.
+/// Returns a smooth background with a spot and noise.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "8 bits")]
 fn scene(width: usize, height: usize, noise: f32) -> Vec<u8> {
     let mut normal = vec![0.0; width * height];
@@ -33,10 +33,10 @@ fn mean_loss(a: &[u8], b: &[u8]) -> f64 {
     a.iter().zip(b).map(|(a, b)| f64::from(a.abs_diff(*b))).sum::<f64>() / a.len() as f64
 }
 
-/// ITU-T T.81, A.3.3 and Annex K, to the letter, for images of whole blocks. Coefficients are kept to an eighth before
-/// they are divided, as the common encoders do; which way halves then go decides where the two differ.
+/// ITU-T T.81, A.3.3 and Annex K, for images of complete blocks. Coefficients are rounded to 1/8 before division, as in
+/// common encoders. Halves may round differently from the fast routine.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "8 bits")]
-fn by_the_book(image: &[u8], width: usize, quality: u32) -> Vec<u8> {
+fn reference(image: &[u8], width: usize, quality: u32) -> Vec<u8> {
     let luma = [
         [16, 11, 10, 16, 24, 40, 51, 61],
         [12, 12, 14, 19, 26, 58, 60, 55],
@@ -79,19 +79,19 @@ fn by_the_book(image: &[u8], width: usize, quality: u32) -> Vec<u8> {
 }
 
 #[test]
-fn grey_images_are_by_the_book() {
+fn grey_images_match_itu_t81() {
     let width = 96;
     for noise in [0.0, 3.0, 12.0] {
         let image = scene(width, 64, noise);
         for quality in [10, 49, 50, 75, 90, 95, 100] {
             let mut fast = image.clone();
             grey(quality).grey(&mut fast, width);
-            let slow = by_the_book(&image, width, quality);
+            let slow = reference(&image, width, quality);
             let blocks_off = (0..96).filter(|b| {
                 let pixel = |i: usize| (b / 12 * 8 + i / 8) * width + b % 12 * 8 + i % 8;
                 (0..64).any(|i| fast[pixel(i)].abs_diff(slow[pixel(i)]) > 1)
             });
-            // A coefficient between two steps may go either way, and take its block along.
+            // A coefficient halfway between two steps may round either way, which changes its block.
             let off = blocks_off.count();
             assert!(off <= 12, "quality {quality}, noise {noise}: {off} of 96 blocks differ");
             assert!(mean_loss(&fast, &slow) < 0.3, "quality {quality}: {}", mean_loss(&fast, &slow));
@@ -99,7 +99,7 @@ fn grey_images_are_by_the_book() {
     }
 }
 
-/// A picture that needs no floating point, so that any program can make it.
+/// Returns an image computed in integers, so that any program can reproduce it.
 #[expect(clippy::cast_possible_truncation, reason = "8 bits")]
 fn integer_scene(width: usize, height: usize, channels: usize) -> Vec<u8> {
     (0..width * height * channels)
@@ -114,16 +114,17 @@ fn hash(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |h, &b| (h ^ u64::from(b)).wrapping_mul(0x100_0000_01b3))
 }
 
-/// Hashes of what Pillow 13 with libjpeg-turbo saved and loaded again; `external_jpeg.py` compares anew.
+/// Hashes of images that Pillow 13 with libjpeg-turbo saved and loaded; `external_jpeg.py` compares with the installed
+/// Pillow.
 #[test]
-fn images_are_those_of_another_program() {
+fn images_match_pillow() {
     let (width, height) = (93, 41);
     let mut hashes = Vec::new();
     for quality in [10, 50, 75, 90, 100] {
         let mut image = integer_scene(width, height, 1);
         grey(quality).grey(&mut image, width);
         hashes.push(hash(&image));
-        for subsampling in [Subsampling::Full, Subsampling::Columns, Subsampling::Squares] {
+        for subsampling in [Subsampling::S444, Subsampling::S422, Subsampling::S420] {
             let mut image = integer_scene(width, height, 3);
             jpeg(quality, subsampling).rgb(&mut image, width);
             hashes.push(hash(&image));
@@ -156,7 +157,7 @@ const PILLOW: [u64; 20] = [
 ];
 
 #[test]
-fn better_quality_loses_less() {
+fn loss_decreases_with_quality() {
     let image = scene(333, 217, 4.0);
     let losses = [1, 10, 30, 50, 75, 90, 95, 100].map(|quality| {
         let mut lossy = image.clone();
@@ -168,7 +169,7 @@ fn better_quality_loses_less() {
 }
 
 #[test]
-fn flat_images_stay_flat() {
+fn uniform_images_stay_uniform() {
     for (width, height) in [(1, 1), (7, 9), (16, 16), (33, 20)] {
         for level in [0, 1, 127, 128, 200, 255] {
             for quality in [50, 90, 100] {
@@ -176,7 +177,7 @@ fn flat_images_stay_flat() {
                 grey(quality).grey(&mut image, width);
                 let steps = [2, 0, 0][[50, 90, 100].iter().position(|&q| q == quality).unwrap()];
                 assert!(image.iter().all(|&v| v == image[0] && v.abs_diff(level) <= steps / 2), "{level} {quality}");
-                for subsampling in [Subsampling::Full, Subsampling::Columns, Subsampling::Squares] {
+                for subsampling in [Subsampling::S444, Subsampling::S422, Subsampling::S420] {
                     let mut rgb = vec![level; 3 * width * height];
                     jpeg(quality, subsampling).rgb(&mut rgb, width);
                     assert!(rgb.iter().zip(image.iter().cycle()).all(|(a, b)| a == b), "{level} {quality}");
@@ -186,9 +187,9 @@ fn flat_images_stay_flat() {
     }
 }
 
-/// The colour differences of a grey picture are 0 and stay so.
+/// The chroma of a grey image is 0 and stays 0.
 #[test]
-fn frames_and_grey_pictures_are_grey_images() {
+fn frames_and_grey_rgb_images_match_grey_images() {
     let image = scene(50, 37, 5.0);
     let mut expected = image.clone();
     grey(85).grey(&mut expected, 50);
@@ -196,7 +197,7 @@ fn frames_and_grey_pictures_are_grey_images() {
     grey(85).frame(&mut frame, 50);
     assert!(frame.iter().zip(&expected).all(|(a, b)| *a == u16::from(*b)));
     let mut rgb: Vec<u8> = image.iter().flat_map(|v| [*v; 3]).collect();
-    jpeg(85, Subsampling::Squares).rgb(&mut rgb, 50);
+    jpeg(85, Subsampling::S420).rgb(&mut rgb, 50);
     assert!(rgb.chunks_exact(3).zip(&expected).all(|(rgb, grey)| rgb == [*grey; 3]));
     let mut bright = [300, 255, 256, 254];
     grey(100).frame(&mut bright, 4);
@@ -204,13 +205,13 @@ fn frames_and_grey_pictures_are_grey_images() {
 }
 
 #[test]
-fn impossible_numbers_are_refused_by_name() {
+fn out_of_range_values_are_rejected_by_field() {
     let error = |params: JpegParams| Jpeg::new(&params).unwrap_err().to_string();
     for quality in [0, 101, u32::MAX] {
         let params = JpegParams { quality, ..JpegParams::default() };
         assert_eq!(error(params), format!("quality is {quality}; it must be from 1 to 100"));
     }
     let params = JpegParams { bit_depth: 16, ..JpegParams::default() };
-    assert_eq!(error(params), "bit_depth is 16; it must be 8, all that baseline JPEG has");
-    assert_eq!(JpegParams::default().subsampling, Subsampling::Squares);
+    assert_eq!(error(params), "bit_depth is 16; it must be 8, the bit depth of baseline JPEG");
+    assert_eq!(JpegParams::default().subsampling, Subsampling::S420);
 }

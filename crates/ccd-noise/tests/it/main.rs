@@ -2,4 +2,4 @@
 
 mod emva;
 mod jpeg;
-mod laws;
+mod properties;

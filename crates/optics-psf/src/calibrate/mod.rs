@@ -1,10 +1,10 @@
-//! Measures blur on a user's images: the paper's own procedures, and the condenser's aperture.
+//! Measures blur in images: the procedures of the paper, and the aperture of the condenser.
 //!
-//! - [`focus`]: σ against focus offset, from a stack of one object (Fig. 10).
+//! - [`focus`]: σ against focus offset, from a focus stack of one object (Fig. 10).
 //! - [`edge`]: σ of the image plane, from an edge in focus ("Impulse response").
-//! - [`condenser`]: the aperture of the condenser that explains a stack.
+//! - [`condenser`]: the condenser aperture that fits a focus stack best.
 //!
-//! Images are intensities of any unit, rows of `width` pixels.
+//! Images are intensities in any unit, in rows of `width` pixels.
 
 mod edge;
 
@@ -16,21 +16,21 @@ use crate::grid::fast_length;
 use crate::lane_plane::{LANES, LanePlane, LanePlans, LaneScratch, LaneSupport, Lanes};
 use crate::{Border, Error, Gaussian, Microscope, MicroscopeParams, Scratch};
 
-/// Smallest side of a window, pixels: less has no statistics.
-const LEAST_SIDE: usize = 8;
+/// Smallest width and height of a window, in pixels.
+const MIN_SIDE: usize = 8;
 
 impl Window {
-    /// Whether it lies inside an image.
+    /// Returns an error unless the window lies inside an image and is large enough.
     fn check(self, width: usize, height: usize) -> Result<(), Error> {
-        let fits = |from: usize, len: usize, side: usize| len >= LEAST_SIDE && from <= side && len <= side - from;
+        let fits = |from: usize, len: usize, side: usize| len >= MIN_SIDE && from <= side && len <= side - from;
         if fits(self.left, self.width, width) && fits(self.top, self.height, height) {
             Ok(())
         } else {
-            Err(Error::Window { window: self, width, height, least: LEAST_SIDE })
+            Err(Error::Window { window: self, width, height, min_side: MIN_SIDE })
         }
     }
 
-    /// It and `margin` pixels around, as far as the image goes.
+    /// Returns the window grown by `margin` pixels on each side, clipped to the image.
     fn grown(self, margin: usize, width: usize, height: usize) -> Self {
         let (left, top) = (self.left.saturating_sub(margin), self.top.saturating_sub(margin));
         let right = (self.left + self.width + margin).min(width);
@@ -38,57 +38,57 @@ impl Window {
         Self { left, top, width: right - left, height: bottom - top }
     }
 
-    /// Its pixels, row after row.
+    /// Iterates over the pixels of the window, row by row.
     fn crop(self, image: &[f32], width: usize) -> impl Iterator<Item = f32> {
         let rows = self.top..self.top + self.height;
         rows.flat_map(move |y| &image[y * width + self.left..][..self.width]).copied()
     }
 }
 
-/// What a window shows of a stack.
-struct Seen {
-    /// The plane with most detail, which is neither the first nor the last.
+/// A window of a focus stack.
+struct StackWindow {
+    /// Index of the plane with the most detail, neither the first nor the last.
     focused: usize,
-    /// The window with a margin, the window in that, and what the focused plane holds there.
+    /// The window with a margin, the window relative to it, and the pixels of the focused plane in it.
     outer: Window,
     inner: Window,
     source: Vec<f32>,
-    /// What each plane holds in the window.
+    /// Pixels of each plane in the window.
     targets: Vec<Vec<f32>>,
 }
 
-impl Seen {
+impl StackWindow {
     /// # Panics
     ///
-    /// As the public functions say.
+    /// See the public functions.
     fn new(stack: &[&[f32]], width: usize, window: Window, margin: usize) -> Result<Self, Error> {
-        require("stack", stack.len() as f64, stack.len() >= 3, "three planes or more")?;
-        assert!(width > 0 && stack[0].len().is_multiple_of(width), "an image is not whole rows of its width");
-        assert!(stack.iter().all(|plane| plane.len() == stack[0].len()), "planes differ in size");
+        require("stack", stack.len() as f64, stack.len() >= 3, "at least three planes")?;
+        assert!(width > 0 && stack[0].len().is_multiple_of(width), "image lengths must be a multiple of the width");
+        assert!(stack.iter().all(|plane| plane.len() == stack[0].len()), "all planes must have the same size");
         let height = stack[0].len() / width;
         window.check(width, height)?;
         let targets: Vec<Vec<f32>> = stack.iter().map(|plane| window.crop(plane, width).collect()).collect();
         let detail: Vec<f64> = targets.iter().map(|target| detail(target, window.width)).collect();
         if detail.iter().any(|d| !d.is_finite()) || detail.iter().all(|d| *d == 0.0) {
-            return Err(Error::Nothing { thing: "detail" });
+            return Err(Error::NothingToMeasure { what: "detail" });
         }
         let focused = (0..detail.len()).max_by(|&a, &b| detail[a].total_cmp(&detail[b])).unwrap_or(0);
         if focused == 0 || focused + 1 == stack.len() {
-            return Err(Error::NoFocusInside { sharpest: focused, planes: stack.len() });
+            return Err(Error::FocusAtStackEnd { sharpest: focused, planes: stack.len() });
         }
         let outer = window.grown(margin, width, height);
         let inner = Window { left: window.left - outer.left, top: window.top - outer.top, ..window };
         Ok(Self { focused, outer, inner, source: outer.crop(stack[focused], width).collect(), targets })
     }
 
-    /// The mean of |a − b| over the window, of an image of what is around it and a plane.
-    fn difference(&self, image: &[f32], plane: usize) -> f64 {
+    /// Returns the mean of |a − b| over the window, between an image of the outer window and a plane.
+    fn mean_difference(&self, image: &[f32], plane: usize) -> f64 {
         let (inner, target) = (self.inner.crop(image, self.outer.width), &self.targets[plane]);
         inner.zip(target).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>() / target.len() as f64
     }
 }
 
-/// Squared differences over two pixels, along x and y.
+/// Returns the sum of squared differences over two pixels, along x and y.
 fn detail(image: &[f32], width: usize) -> f64 {
     let square = |a: f32, b: f32| f64::from(a - b) * f64::from(a - b);
     let along: f64 = image.chunks_exact(width).flat_map(|row| row.windows(3)).map(|w| square(w[0], w[2])).sum();
@@ -96,8 +96,8 @@ fn detail(image: &[f32], width: usize) -> f64 {
     along + across
 }
 
-/// Where a curve sampled at equal steps is least, in steps, and its value there: a parabola through the lowest
-/// sample and its neighbours.
+/// Returns the position, in steps, and the value of the minimum of a sampled curve, from a parabola through the
+/// smallest sample and its neighbours.
 fn lowest(samples: &[f64]) -> (f64, f64) {
     let best = (0..samples.len()).min_by(|&a, &b| samples[a].total_cmp(&samples[b])).unwrap_or(0);
     if best == 0 || best + 1 == samples.len() {
@@ -112,43 +112,43 @@ fn lowest(samples: &[f64]) -> (f64, f64) {
     (best as f64 + shift, b - 0.25 * (a - c) * shift)
 }
 
-/// Widest Gaussian that is tried, and the step between two, pixels.
+/// Largest σ of the search, and its step, in pixels.
 const WIDEST_PX: f64 = 16.0;
 const STEP_PX: f64 = 0.2;
 
-/// How far beyond the window the focused plane is looked at: three times the widest.
+/// Margin around the window in pixels: three times the largest σ.
 const BLUR_MARGIN_PX: usize = 48;
 
 /// Blur against focus offset: the paper's Fig. 10.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FocusCurve {
-    /// The plane in focus: the one with most detail in the window.
+    /// Index of the plane in focus: the one with the most detail in the window.
     pub focused: usize,
-    /// For each plane, σ in pixels of the Gaussian that maps the focused plane to it best; 0 for itself.
+    /// For each plane, σ in pixels of the Gaussian that best maps the focused plane to it; 0 for the focused plane.
     pub sigma_px: Vec<f64>,
-    /// For each plane, the mean of what is left between the two.
-    pub difference: Vec<f64>,
-    /// The line through the planes before the focused one.
+    /// For each plane, the mean absolute residual of this fit.
+    pub mean_residual: Vec<f64>,
+    /// Line through the planes before the focused one.
     pub before: Line,
-    /// The line through those after it.
+    /// Line through the planes after the focused one.
     pub after: Line,
 }
 
-/// σ against the number of planes from focus, |n|.
+/// Lines fitted to σ against the number of planes from focus, |n|.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
-    /// Pixels per plane, of the line that best fits.
+    /// Slope of the least-squares line, in pixels per plane.
     pub slope_px: f64,
-    /// What that line has in focus, pixels.
+    /// Value of this line in focus, in pixels.
     pub intercept_px: f64,
-    /// Pixels per plane, of the line through 0 that best fits: σ = k·n.
+    /// Slope of the least-squares line through 0, σ = k·n, in pixels per plane.
     pub proportional_px: f64,
 }
 
 impl Line {
-    /// Least squares through points (n, σ).
+    /// Fits points (n, σ) by least squares.
     ///
-    /// With less than two points there is no slope, and it is that through 0.
+    /// With fewer than two distinct n, the slope is that of the line through 0.
     #[must_use]
     pub fn through(points: &[[f64; 2]]) -> Self {
         let count = points.len() as f64;
@@ -165,77 +165,84 @@ impl Line {
     }
 }
 
-/// σ against focus offset, from a stack of an object: for each plane the Gaussian is sought that, applied to the
-/// focused plane, which the paper selects by eye, gives the least ∑ |difference| over the window (Fig. 10, Eq. 14), up to
-/// 16 pixels.
+/// Measures σ against focus offset in a focus stack of one object.
+///
+/// For each plane the search finds the Gaussian, up to 16 pixels wide, that minimises ∑ |difference| over the window
+/// when applied to the focused plane (Fig. 10, Eq. 14). The paper selects the focused plane by eye.
 ///
 /// # Errors
 ///
-/// If there are less than three planes, the window is not inside the images, there is no detail in it, or
-/// the sharpest plane is the first or the last.
+/// If there are fewer than three planes, the window is not inside the images or has no detail, or the sharpest plane is
+/// the first or the last.
 ///
 /// # Panics
 ///
-/// If the images are not whole rows of `width` or differ in size.
+/// If the image lengths are not a multiple of `width` or differ.
 pub fn focus(stack: &[&[f32]], width: usize, window: Window) -> Result<FocusCurve, Error> {
-    let seen = Seen::new(stack, width, window, BLUR_MARGIN_PX)?;
-    let focused = seen.focused;
+    let stack_window = StackWindow::new(stack, width, window, BLUR_MARGIN_PX)?;
+    let focused = stack_window.focused;
     let mut differences = vec![Vec::new(); stack.len()];
-    let (mut blurred, mut scratch) = (seen.source.clone(), Scratch::new());
+    let (mut blurred, mut scratch) = (stack_window.source.clone(), Scratch::new());
     let mut sigma = 0.0;
     while sigma <= WIDEST_PX {
         let gaussian = Gaussian::new(sigma)?;
-        gaussian.blur_into(&seen.source, seen.outer.width, Border::Replicate, &mut blurred, &mut scratch);
+        gaussian.blur_into(
+            &stack_window.source,
+            stack_window.outer.width,
+            Border::Replicate,
+            &mut blurred,
+            &mut scratch,
+        );
         for (plane, list) in differences.iter_mut().enumerate() {
-            list.push(seen.difference(&blurred, plane));
+            list.push(stack_window.mean_difference(&blurred, plane));
         }
         sigma += STEP_PX;
     }
-    let (steps, difference): (Vec<f64>, Vec<f64>) = differences.iter().map(|list| lowest(list)).unzip();
+    let (steps, mean_residual): (Vec<f64>, Vec<f64>) = differences.iter().map(|list| lowest(list)).unzip();
     let sigma_px: Vec<f64> = steps.iter().map(|s| s * STEP_PX).collect();
     let points =
         |planes: core::ops::Range<usize>| planes.map(|i| [i.abs_diff(focused) as f64, sigma_px[i]]).collect::<Vec<_>>();
     let (before, after) = (Line::through(&points(0..focused)), Line::through(&points(focused + 1..stack.len())));
-    Ok(FocusCurve { focused, sigma_px, difference, before, after })
+    Ok(FocusCurve { focused, sigma_px, mean_residual, before, after })
 }
 
-/// Pixels around the window that the transfer functions see.
+/// Margin around the window for the transfer functions, in pixels.
 const MARGIN_PX: usize = 32;
 
-/// Apertures that are tried, as parts of the objective's: from a tenth on, in steps of a twentieth.
+/// Searched apertures, as fractions of the objective's: from 0.1 in steps of 0.05.
 const FIRST_NA: f64 = 0.1;
 const STEP_NA: f64 = 0.05;
 const TRIED: u32 = 19;
 
-/// What of the focused plane's own transfer counts as noise where it is to be undone.
+/// Noise level of the focused plane for Wiener deconvolution, relative to full transfer.
 const NOISE: f64 = 0.1;
 
-/// The condenser's aperture that explains a stack best.
+/// The condenser aperture that fits a focus stack best.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CondenserFit {
-    /// The plane in focus.
+    /// Index of the plane in focus.
     pub focused: usize,
-    /// The numerical aperture.
+    /// Numerical aperture of the condenser.
     pub condenser_na: f64,
-    /// Apertures that were tried, and the mean difference each leaves.
+    /// Searched apertures, each with its mean absolute difference.
     pub tried: Vec<[f64; 2]>,
 }
 
-/// The condenser's aperture, from a stack of an object taken by moving the stage by `step_um` for each plane through the
-/// immersion medium.
+/// Measures the condenser's aperture from a focus stack of one object, for which the stage moved by `step_um` per plane
+/// in the immersion medium.
 ///
-/// The other planes are computed from the focused one by the ratio of the transfer functions H_A,
-/// and the aperture is sought, from a tenth of the objective's to all of it, for which ∑ |difference| over
-/// the window and all planes is least. All else, the pixel too, is as `microscope` says; absorption alone
-/// counts, so an object that refracts much is no good one.
+/// The other planes are predicted from the focused one by the ratio of transfer functions H_A. The result is the
+/// aperture, from a tenth of the objective's to all of it, that minimises ∑ |difference| over the window and all
+/// planes. All other parameters, including the pixel, are those of `microscope`. The model includes absorption only:
+/// objects with strong refraction are unsuitable.
 ///
 /// # Errors
 ///
-/// As [`focus`](focus()); if `step_um` is not above 0 and at most 100, or `microscope` not in order.
+/// See [`focus`](focus()). Also if `step_um` is not above 0 and at most 100, or `microscope` is invalid.
 ///
 /// # Panics
 ///
-/// If the images are not whole rows of `width` or differ in size.
+/// If the image lengths are not a multiple of `width` or differ.
 pub fn condenser(
     stack: &[&[f32]],
     width: usize,
@@ -245,10 +252,10 @@ pub fn condenser(
 ) -> Result<CondenserFit, Error> {
     require("step_um", step_um, step_um > 0.0 && step_um <= 100.0, "above 0 and at most 100")?;
     Microscope::new(microscope)?;
-    let seen = Seen::new(stack, width, window, MARGIN_PX)?;
-    let Seen { focused, outer, source, .. } = &seen;
+    let stack_window = StackWindow::new(stack, width, window, MARGIN_PX)?;
+    let StackWindow { focused, outer, source, .. } = &stack_window;
 
-    // Reflected, so that the seam of the periodic grid has no step.
+    // Mirrored, so that the periodic grid has no step at its seam.
     let [wide, high] = [outer.width, outer.height].map(|side| fast_length(2 * side));
     let plane = LanePlane::new(wide, high, &LanePlans::default());
     let support = LaneSupport::new(wide, high, 1.0);
@@ -279,7 +286,7 @@ pub fn condenser(
             for (value, frequencies) in filtered.iter_mut().zip(&frequencies) {
                 for (l, &f) in frequencies.iter().enumerate() {
                     let ([now, _], [then, _]) = (transfer.absorption(f), rest.absorption(f));
-                    #[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 spectra")]
+                    #[expect(clippy::cast_possible_truncation, reason = "spectra use single precision")]
                     let ratio = (now * then * (1.0 + NOISE * NOISE) / (then * then + NOISE * NOISE)) as f32;
                     value[0][l] *= ratio * plane.norm();
                     value[1][l] *= ratio * plane.norm();
@@ -287,7 +294,7 @@ pub fn condenser(
             }
             let mut image = vec![0.0; outer.width * outer.height];
             plane.image_into(&support, &filtered, outer.width, &mut image, &mut scratch);
-            sum += seen.difference(&image, k);
+            sum += stack_window.mean_difference(&image, k);
         }
         tried.push([condenser_na, sum / (stack.len() - 1) as f64]);
     }

@@ -1,4 +1,4 @@
-//! Abbe's image against the reference arrays, and its laws.
+//! Tests of Abbe's integration against reference arrays, and of invariants.
 
 use crate::support;
 use core::f64::consts::LN_10;
@@ -14,7 +14,7 @@ fn abbe(condenser_na: f64, source: Source) -> Abbe {
 const FULL: Source = Source::Lattice { stride: 1 };
 
 #[test]
-fn full_lattice_is_the_reference_and_few_points_converge_to_it() {
+fn full_lattice_matches_the_reference_and_few_points_converge() {
     for (object, name, condenser_na) in
         [("disk", "060", 0.6), ("disk", "090", 0.9), ("asym", "060", 0.6), ("asym", "090", 0.9)]
     {
@@ -32,18 +32,18 @@ fn full_lattice_is_the_reference_and_few_points_converge_to_it() {
 }
 
 #[test]
-fn two_layers_are_the_reference() {
+fn two_layers_match_the_reference() {
     let (Some(disk), Some(asym)) = (array("ref_disk_absorbance"), array("ref_asym_absorbance")) else { return };
     let Some(reference) = array("ref_multislice2_nac060") else { return };
     let below: Vec<f64> = shifted(&disk, -10, 6).iter().map(|a| 0.6 * a).collect();
-    // The arrays count z away from the objective, from the focal plane on.
+    // The arrays count z from the focal plane, away from the objective.
     let layers = [absorbing(3.0, &shifted(&asym, 8, -4)), absorbing(-2.0, &below)];
     let image = abbe(0.6, Source::Lattice { stride: 2 }).image(&layers, 0.0).unwrap();
     assert!(worst(&image, &reference) < 1e-9, "{}", worst(&image, &reference));
 }
 
 #[test]
-fn objects_that_refract_are_the_reference() {
+fn refracting_objects_match_the_reference() {
     for z in [0, 2, -2] {
         let Some(reference) = array(&format!("ref_abbe_phase_nac060_z{z:+}")) else { return };
         let (absorbance, phase) = phase_object();
@@ -54,14 +54,14 @@ fn objects_that_refract_are_the_reference() {
         let layer = Layer::new(-f64::from(z), amplitude.collect()).unwrap();
         let image = abbe(0.6, FULL).image(&[layer], 0.0).unwrap();
         assert!(worst(&image, &reference) < 1e-9, "{z}: {}", worst(&image, &reference));
-        let layer = Layer::refracting(-f64::from(z), &single(&absorbance), &single(&phase)).unwrap();
+        let layer = Layer::from_absorbance(-f64::from(z), &single(&absorbance), &single(&phase)).unwrap();
         let image = abbe(0.6, FULL).image(&[layer], 0.0).unwrap();
         assert!(worst(&image, &reference) < 1e-6, "{z}: {}", worst(&image, &reference));
     }
 }
 
 #[test]
-fn empty_slide_is_light() {
+fn empty_slide_has_unit_intensity() {
     let clear = vec![[1.0, 0.0]; SIDE * SIDE];
     for source in [Source::Vogel { points: 7 }, Source::Lattice { stride: 9 }, Source::Axis] {
         let layers = [4.0, -1.0].map(|z| Layer::new(z, clear.clone()).unwrap());
@@ -79,7 +79,7 @@ fn weak_objects_obey_the_transfer_function() {
     for z in [0.0, 3.0] {
         let image = abbe(0.6, FULL).image(&[absorbing(z, &disk)], 0.0).unwrap();
         let transfer = microscope(0.6).transfer(z, 0.0).unwrap();
-        // ln 10 · H_A ⊗ A along the row through the centre, one frequency after the other
+        // ln 10 · H_A ⊗ A along the central row, one frequency at a time.
         let f = |i: i32| f64::from(i) / (SIDE as f64 * 0.125);
         let mut coefficients = support::coefficients(&disk, 44).into_iter();
         let mut spectrum = Vec::new();
@@ -110,13 +110,13 @@ fn weak_objects_obey_the_transfer_function() {
 }
 
 #[test]
-fn shifts_and_turns_of_the_object_shift_and_turn_the_image() {
+fn image_follows_shifts_and_reflections_of_the_object() {
     let Some(asym) = array("ref_asym_absorbance") else { return };
     let abbe = abbe(0.6, Source::Lattice { stride: 6 });
     let image = |a: &[f64]| abbe.image(&[absorbing(2.0, a)], 0.0).unwrap();
     let plain = image(&asym);
     assert!(worst(&image(&shifted(&asym, 5, -9)), &shifted(&plain, 5, -9)) < 1e-12);
-    // Reflection in the diagonal, and in the column 0 of the periodic grid.
+    // Reflection in the diagonal, and in column 0 of the periodic grid.
     let turned = |a: &[f64]| (0..SIDE * SIDE).map(|i| a[(i % SIDE) * SIDE + i / SIDE]).collect::<Vec<_>>();
     let mirrored =
         |a: &[f64]| (0..SIDE * SIDE).map(|i| a[i / SIDE * SIDE + (SIDE - i % SIDE) % SIDE]).collect::<Vec<_>>();
@@ -126,8 +126,8 @@ fn shifts_and_turns_of_the_object_shift_and_turn_the_image() {
 }
 
 #[test]
-fn the_energy_of_coherent_light_does_not_depend_on_focus() {
-    // A phase object loses nothing but what the aperture stops, and defocus stops nothing.
+fn coherent_energy_does_not_depend_on_focus() {
+    // A phase object loses only light blocked by the aperture; defocus blocks none.
     let (_, phase) = phase_object();
     let amplitude: Vec<[f64; 2]> = phase.iter().map(|p| [libm::cos(4.0 * p), libm::sin(4.0 * p)]).collect();
     let energy = |depth, stage| {
@@ -141,7 +141,7 @@ fn the_energy_of_coherent_light_does_not_depend_on_focus() {
 }
 
 #[test]
-fn impossible_grids_are_refused_by_name() {
+fn invalid_grids_are_rejected_by_field() {
     let make = |params: AbbeParams| Abbe::new(&microscope(0.6), &params).unwrap_err().to_string();
     assert!(make(AbbeParams { width: 0, ..AbbeParams::default() }).starts_with("width is 0"));
     assert!(make(AbbeParams { height: 1 << 20, ..AbbeParams::default() }).starts_with("height"));

@@ -1,15 +1,15 @@
-//! The product of filtered transmittances against Abbe's images, and its laws.
+//! Tests of the product of filtered transmittances against Abbe's images, and of invariants.
 
 use crate::support;
 use crate::support::{SIDE, array, double, phase_object, relative, shifted, single, soft_disk, worst};
 use optics_psf::{
-    Abbe, AbbeParams, BrightField, BrightFieldParams, DepthOfFocus, FocusParams, Gaussian, LEAST_LIGHT, Layer,
+    Abbe, AbbeParams, BrightField, BrightFieldParams, DepthOfFocus, FocusParams, Gaussian, Layer, MIN_TRANSMITTANCE,
     Microscope, MicroscopeParams, Padding, Zernike,
 };
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-/// Samples are pixels: the arrays' 0.125 µm.
+/// Returns parameters with one sample per pixel, the arrays' 0.125 µm.
 fn sampled(condenser_na: f64) -> MicroscopeParams {
     MicroscopeParams {
         condenser_na,
@@ -36,7 +36,7 @@ fn field_with(microscope: &MicroscopeParams, params: BrightFieldParams) -> Brigh
     BrightField::new(&Microscope::new(microscope).unwrap(), &params).unwrap()
 }
 
-/// The first plane of slabs of absorbance.
+/// Returns the first image of slabs of absorbance.
 fn image(field: &BrightField, slabs: &[&[f64]]) -> Vec<f64> {
     let mut specimen = field.specimen();
     for (k, slab) in slabs.iter().enumerate() {
@@ -51,15 +51,15 @@ fn noise(seed: u64, most: f64) -> Vec<f64> {
 }
 
 /// The paper's model: a Gaussian on absorbance (Eq. 14), then Eq. 11.
-fn papers(params: &FocusParams, depth_um: f64, absorbance: &[f64]) -> Vec<f64> {
-    // A pixel of the paper's is two samples.
+fn paper_model(params: &FocusParams, depth_um: f64, absorbance: &[f64]) -> Vec<f64> {
+    // A pixel of the paper is two samples.
     let sigma_px = 2.0 * DepthOfFocus::new(params).unwrap().sigma_px(depth_um);
     let blurred = Gaussian::new(sigma_px).unwrap().blur(&single(absorbance), SIDE, optics_psf::Border::Zero);
     blurred.iter().map(|a| libm::exp10(-f64::from(*a))).collect()
 }
 
 #[test]
-fn one_slab_is_within_1_2_percent_of_abbe_and_the_papers_model_is_not() {
+fn one_slab_is_within_1_2_percent_of_abbe_but_the_paper_model_is_not() {
     for (object, name, condenser_na) in
         [("disk", "060", 0.6), ("disk", "090", 0.9), ("asym", "060", 0.6), ("asym", "090", 0.9)]
     {
@@ -71,8 +71,8 @@ fn one_slab_is_within_1_2_percent_of_abbe_and_the_papers_model_is_not() {
             let bound = if z == 0 { 0.002 } else { 0.012 };
             assert!(error < bound, "{object} {name} {z}: {error}");
             if z == 2 {
-                let in_pixels = relative(&papers(&FocusParams::paper(), 2.0, &absorbance), &reference);
-                let in_um = relative(&papers(&FocusParams::paper_in_micrometres(), 2.0, &absorbance), &reference);
+                let in_pixels = relative(&paper_model(&FocusParams::paper(), 2.0, &absorbance), &reference);
+                let in_um = relative(&paper_model(&FocusParams::paper_in_micrometres(), 2.0, &absorbance), &reference);
                 assert!(in_pixels > 0.05 && in_um > 0.35, "{object} {name}: {in_pixels} {in_um}");
             }
         }
@@ -81,8 +81,9 @@ fn one_slab_is_within_1_2_percent_of_abbe_and_the_papers_model_is_not() {
 
 #[test]
 fn in_focus_every_aperture_is_within_0_2_percent_of_many_directions() {
-    // The stored arrays have 900 directions; 1024 on a spiral differ from them by 0.1 % at most, so what (1 − W₀ ⊗ a)²
-    // lacked under an open condenser, 0.4 % at 0.9, was not theirs: light scattered twice interferes less there.
+    // The stored arrays have 900 directions. 1024 directions on a spiral differ from them by at most 0.1 %. The error
+    // of (1 − W₀ ⊗ a)² with an open condenser, 0.4 % at 0.9, is therefore real: twice-scattered light interferes less
+    // there.
     let objects = [array("ref_disk_absorbance"), array("ref_asym_absorbance")];
     for object in objects.into_iter().flatten() {
         for condenser_na in [0.41, 0.75, 0.9, 0.95] {
@@ -108,7 +109,7 @@ fn two_slabs_are_within_2_percent_of_abbe() {
 }
 
 #[test]
-fn halos_are_within_2_5_percent_of_abbe_and_change_sides_with_focus() {
+fn halos_are_within_2_5_percent_of_abbe_and_invert_through_focus() {
     let (absorbance, phase) = phase_object();
     for z in [0, 2, -2] {
         let Some(reference) = array(&format!("ref_abbe_phase_nac060_z{z:+}")) else { return };
@@ -124,7 +125,7 @@ fn halos_are_within_2_5_percent_of_abbe_and_change_sides_with_focus() {
 }
 
 #[test]
-fn aberrations_with_a_side_agree_with_abbe() {
+fn asymmetric_aberrations_match_abbe() {
     let Some(asym) = array("ref_asym_absorbance") else { return };
     let zernike = Zernike { coma: [0.08, -0.04], astigmatism: [0.0, 0.06], spherical: 0.03, ..Zernike::default() };
     let params = MicroscopeParams { zernike, ..sampled(0.6) };
@@ -134,7 +135,7 @@ fn aberrations_with_a_side_agree_with_abbe() {
     let half: Vec<f64> = asym.iter().map(|a| 0.5 * a).collect();
     let phase: Vec<f64> = half.iter().map(|a| 0.5 * a).collect();
     for stage in [0.0, 1.0] {
-        let layer = Layer::refracting(1.0, &single(&half), &single(&phase)).unwrap();
+        let layer = Layer::from_absorbance(1.0, &single(&half), &single(&phase)).unwrap();
         let reference = abbe.image(&[layer], stage).unwrap();
         let field = field(&params, &[1.0], &[stage]);
         let mut specimen = field.specimen();
@@ -148,8 +149,8 @@ fn aberrations_with_a_side_agree_with_abbe() {
 }
 
 #[test]
-fn light_is_neither_made_nor_lost() {
-    // In single precision; beyond 2 µm a slab is W ⊗ T alone.
+fn light_is_conserved() {
+    // Single precision; beyond 2 µm a slab is W ⊗ T alone.
     let a = noise(0xF1A7, 0.4);
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
     let transmitted: Vec<f64> = a.iter().map(|a| libm::exp10(-a)).collect();
@@ -165,7 +166,7 @@ fn light_is_neither_made_nor_lost() {
 }
 
 #[test]
-fn shifts_and_turns_of_the_object_shift_and_turn_the_image() {
+fn image_follows_shifts_and_reflections_of_the_object() {
     let (near, far) = (noise(1, 0.3), noise(2, 0.3));
     let field = field(&sampled(0.6), &[0.4, 3.0], &[0.0]);
     let plain = image(&field, &[&near, &far]);
@@ -174,13 +175,13 @@ fn shifts_and_turns_of_the_object_shift_and_turn_the_image() {
         |a: &[f64]| (0..SIDE * SIDE).map(|i| a[i / SIDE * SIDE + (SIDE - i % SIDE) % SIDE]).collect::<Vec<_>>();
     let moved = |a: &[f64]| shifted(a, 11, -30);
     for change in [&turned as &dyn Fn(&[f64]) -> Vec<f64>, &mirrored, &moved] {
-        // Rounding of single precision FFTs.
+        // Rounding errors of single precision FFTs.
         assert!(worst(&image(&field, &[&change(&near), &change(&far)]), &change(&plain)) < 5e-6);
     }
 }
 
 #[test]
-fn empty_slabs_are_light_and_padding_is_empty_slide() {
+fn empty_slabs_have_unit_intensity_and_padding_is_empty_slide() {
     let params = sampled(0.6);
     let field = field(&params, &[0.0, 1.0, 4.0], &[0.0]);
     let mut specimen = field.specimen();
@@ -195,7 +196,7 @@ fn empty_slabs_are_light_and_padding_is_empty_slide() {
     specimen.clear();
     assert_eq!(field.image(&mut specimen, 0), vec![1.0; SIDE * SIDE]);
 
-    // The disc and its blur lie inside: what surrounds the tile makes no difference.
+    // The disc and its blur fit into the tile: the surroundings have no effect.
     let padded = BrightFieldParams {
         width: SIDE,
         height: SIDE,
@@ -211,31 +212,31 @@ fn empty_slabs_are_light_and_padding_is_empty_slide() {
 }
 
 #[test]
-fn opaque_slides_are_dark_and_undershoots_are_counted() {
+fn opaque_slides_are_dark_and_clipped_values_are_counted() {
     let deep = soft_disk(3.0, 3.0, 0.12);
     for (depth, most) in [(3.0, SIDE * SIDE), (0.0, 0)] {
         let field = field(&sampled(0.6), &[depth], &[0.0]);
         let mut specimen = field.specimen();
         field.set_absorbance(&mut specimen, 0, &single(&deep));
         let mut out = vec![0.0; SIDE * SIDE];
-        let floored = field.image_into(&mut specimen, 0, &mut out);
+        let clipped = field.image_into(&mut specimen, 0, &mut out);
         let lowest = out.iter().copied().fold(1.0, f32::min);
-        assert!(lowest >= LEAST_LIGHT);
+        assert!(lowest >= MIN_TRANSMITTANCE);
         if most == 0 {
-            // (1 − W₀ ⊗ a)² cannot be negative; at 0.001 it ends on the floor.
+            // (1 − W₀ ⊗ a)² cannot be negative; at 0.001 it reaches the limit.
             assert!(lowest < 0.01);
         } else {
-            assert!(floored > 20 && lowest == LEAST_LIGHT, "{floored} {lowest}");
-            assert_eq!(out.iter().filter(|v| **v == LEAST_LIGHT).count(), floored);
+            assert!(clipped > 20 && lowest == MIN_TRANSMITTANCE, "{clipped} {lowest}");
+            assert_eq!(out.iter().filter(|v| **v == MIN_TRANSMITTANCE).count(), clipped);
         }
         field.set_absorbance(&mut specimen, 0, &vec![9.0; SIDE * SIDE]);
         assert_eq!(field.image_into(&mut specimen, 0, &mut out), SIDE * SIDE);
-        assert!(out.iter().all(|v| *v == LEAST_LIGHT));
+        assert!(out.iter().all(|v| *v == MIN_TRANSMITTANCE));
     }
 }
 
 #[test]
-fn adding_planes_changes_no_plane() {
+fn additional_planes_do_not_change_others() {
     let params = MicroscopeParams { pixel_um: 0.25, oversampling: 2, ..sampled(0.4) };
     let slabs = [noise(3, 0.3), noise(4, 0.3), noise(5, 0.3)].map(|a| single(&a));
     let depths = [-3.0, 0.0, 1.0];
@@ -255,7 +256,7 @@ fn adding_planes_changes_no_plane() {
 }
 
 #[test]
-fn the_stack_is_continuous_through_focus() {
+fn stack_is_continuous_through_focus() {
     let Some(disk) = array("ref_disk_absorbance") else { return };
     let stages: Vec<f64> = (0..90).map(|i| 0.02 * f64::from(i)).collect();
     let field = field(&MicroscopeParams { pixel_um: 0.25, oversampling: 2, ..sampled(0.4) }, &[0.0], &stages);
@@ -268,7 +269,7 @@ fn the_stack_is_continuous_through_focus() {
     }
 }
 
-/// Means over squares of two samples by two.
+/// Returns means over squares of 2 x 2 samples.
 fn pixels(fine: &[f64]) -> Vec<f64> {
     let mean = |i: usize| {
         let at = |dx, dy| fine[(i / 64 * 2 + dy) * SIDE + i % 64 * 2 + dx];
@@ -278,7 +279,7 @@ fn pixels(fine: &[f64]) -> Vec<f64> {
 }
 
 #[test]
-fn the_cameras_lattice_costs_less_than_a_thousandth() {
+fn camera_lattice_error_is_below_a_thousandth() {
     let (Some(disk), Some(asym)) = (array("ref_disk_absorbance"), array("ref_asym_absorbance")) else { return };
     let specks: Vec<f64> = noise(0x5BEC, 1.0).iter().map(|v| if *v < 0.03 { 0.6 } else { 0.0 }).collect();
     for condenser_na in [0.4, 0.6, 0.9] {
@@ -288,7 +289,7 @@ fn the_cameras_lattice_costs_less_than_a_thousandth() {
                 let field = field(&params, &[0.0, z, -z, 1.2 * z], &[0.0]);
                 self::image(&field, &[&asym, &disk, &shifted(&disk, -40, 9), &specks])
             };
-            // Where samples are pixels, all is computed on the object's lattice.
+            // With one sample per pixel, everything is computed on the object's lattice.
             let default = MicroscopeParams::default;
             let on_object = image(MicroscopeParams { pixel_um: 0.125, oversampling: 1, ..default() });
             let error = relative(&image(default()), &pixels(&on_object));
@@ -309,7 +310,7 @@ fn pixels_are_means_over_samples() {
 }
 
 #[test]
-fn stray_light_lifts_the_dark() {
+fn stray_light_brightens_dark_regions() {
     let disk = soft_disk(3.0, 0.5, 0.12);
     let dark = image(&field(&sampled(0.6), &[1.0], &[0.0]), &[&disk]);
     let lit = image(&field(&MicroscopeParams { stray_light: 0.1, ..sampled(0.6) }, &[1.0], &[0.0]), &[&disk]);
@@ -317,7 +318,7 @@ fn stray_light_lifts_the_dark() {
 }
 
 #[test]
-fn transmittances_give_the_same_picture_as_absorbances() {
+fn transmittances_give_the_same_image_as_absorbances() {
     let a = noise(8, 0.5);
     let params = BrightFieldParams { depths_um: vec![0.3, 2.5], ..BrightFieldParams::default() };
     let field = field_with(&sampled(0.6), params);
@@ -331,8 +332,8 @@ fn transmittances_give_the_same_picture_as_absorbances() {
 }
 
 #[test]
-fn binning_by_depth_costs_at_most_0_3_percent() {
-    // A nucleus 3 µm thick: slices of 0.25 µm against slabs of 1 µm, both against Abbe's image of the slices.
+fn slab_thickness_error_is_at_most_0_3_percent() {
+    // A nucleus 3 µm thick: slices of 0.25 µm and slabs of 1 µm, both compared with Abbe's image of the slices.
     let Some(asym) = array("ref_asym_absorbance") else { return };
     let slices = |centre: f64, count: usize| {
         let depth = |k: usize| centre + 3.0 * ((k as f64 + 0.5) / count as f64 - 0.5);
@@ -355,7 +356,7 @@ fn binning_by_depth_costs_at_most_0_3_percent() {
 }
 
 #[test]
-fn impossible_fields_are_refused_by_name() {
+fn invalid_fields_are_rejected_by_name() {
     let make = |params: BrightFieldParams| {
         BrightField::new(&Microscope::new(&MicroscopeParams::default()).unwrap(), &params).unwrap_err().to_string()
     };

@@ -1,4 +1,4 @@
-//! Calibrations on simulated and on real stacks.
+//! Tests of calibration on simulated and real stacks.
 
 #![expect(clippy::cast_possible_truncation, reason = "single precision images")]
 
@@ -9,18 +9,18 @@ use optics_psf::{BrightField, BrightFieldParams, Error, Microscope, MicroscopePa
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-/// Samples of the phantoms, 0.125 µm apart, and pixels.
+/// Size of the phantoms in samples 0.125 µm apart, and in pixels.
 const SIDE: usize = 256;
 const PIXELS: usize = SIDE / 2;
 
-/// The middle half.
+/// The central half of the image.
 const WINDOW: Window = Window { left: PIXELS / 4, top: PIXELS / 4, width: PIXELS / 2, height: PIXELS / 2 };
 
 fn uniform(rng: &mut Xoshiro256PlusPlus, low: f64, high: f64) -> f64 {
     low + (high - low) * f64::from(rng.next_u32()) / 4_294_967_296.0
 }
 
-/// A nucleus: an ellipse with a soft edge, clumps of chromatin, and a rim.
+/// Returns a nucleus: an ellipse with a soft edge, chromatin clumps and a rim.
 fn nucleus(seed: u64) -> Vec<f32> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let clumps: Vec<[f64; 4]> = (0..40)
@@ -45,7 +45,7 @@ fn nucleus(seed: u64) -> Vec<f32> {
     (0..SIDE * SIDE).map(at).collect()
 }
 
-/// Planes of one slab, at these distances of slab and stage.
+/// Returns images of one slab at the given depths and stage positions.
 fn stack(condenser_na: f64, object: &[f32], depths: &[f64], stages: &[f64]) -> Vec<Vec<f32>> {
     let microscope = Microscope::new(&MicroscopeParams { condenser_na, ..MicroscopeParams::default() }).unwrap();
     let mut planes = Vec::new();
@@ -71,7 +71,8 @@ fn slices(planes: &[Vec<f32>]) -> Vec<&[f32]> {
 
 const OFFSETS: [f64; 9] = [-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0];
 
-/// σ/|dz| in µm per µm at 0.5, 1, 2 and 4 µm, and of the line through 0, mean of three nuclei; with symmetry checked.
+/// Returns σ/|dz| in µm per µm at 0.5, 1, 2 and 4 µm, and of the line through 0, averaged over three nuclei. Also
+/// checks symmetry.
 fn blur_per_um(condenser_na: f64, depths: &[f64], stages: &[f64]) -> ([f64; 4], f64) {
     let mut mean = [0.0; 4];
     for seed in 0..3 {
@@ -90,13 +91,13 @@ fn blur_per_um(condenser_na: f64, depths: &[f64], stages: &[f64]) -> ([f64; 4], 
 }
 
 #[test]
-fn a_depth_seen_by_an_aperture_of_0_6_blurs_by_a_quarter() {
+fn depth_blurs_by_a_quarter_at_condenser_na_0_6() {
     let (per_um, _) = blur_per_um(0.6, &OFFSETS, &[0.0]);
     assert!(per_um.iter().all(|k| (0.22..=0.26).contains(k)), "{per_um:?}");
 }
 
 #[test]
-fn the_default_condenser_reproduces_fig_10_as_a_travel_of_the_stage() {
+fn default_condenser_reproduces_fig_10_with_stage_movement() {
     let (per_um, proportional) = blur_per_um(MicroscopeParams::default().condenser_na, &[0.0], &OFFSETS);
     assert!((proportional - 0.25).abs() < 0.005, "{proportional} {per_um:?}");
     // No aperture gives 1 µm per µm, the other reading of "σ ≃ dz".
@@ -105,7 +106,7 @@ fn the_default_condenser_reproduces_fig_10_as_a_travel_of_the_stage() {
 }
 
 #[test]
-fn the_condenser_is_found_from_its_stack() {
+fn condenser_aperture_is_recovered_from_a_stack() {
     for condenser_na in [0.3, 0.6, 0.8] {
         let stages: Vec<f64> = (-4..=4).map(|i| 0.8 * f64::from(i)).collect();
         let planes = stack(condenser_na, &nucleus(9), &[0.0], &stages);
@@ -115,7 +116,7 @@ fn the_condenser_is_found_from_its_stack() {
     }
 }
 
-/// An edge at an angle, through the middle of the slide, with this σ of its own.
+/// Returns an edge at an angle through the centre of the slide, with a given σ.
 fn half_plane(angle: f64, sigma_um: f64) -> Vec<f32> {
     let normal = [libm::cos(angle), libm::sin(angle)];
     let at = |i: usize| {
@@ -126,12 +127,12 @@ fn half_plane(angle: f64, sigma_um: f64) -> Vec<f32> {
 }
 
 #[test]
-fn edges_in_focus_are_half_a_pixel_to_two_thirds_wide() {
+fn edges_in_focus_are_half_to_two_thirds_of_a_pixel_wide() {
     let window = Window { left: 52, top: 52, width: 24, height: 24 };
-    // Sharp edges, and those of 0.12 µm that the phantoms of the references have; the pixel is included. No measure
-    // of width is the same for all apertures: σ fitted to light or absorbance, distances from 10 to 90 or 25 to 75 %
-    // and the steepest slope all grow by a third and more from 0.3 to 0.9. 0.64 ± 0.03 pixels is the soft edge up to
-    // an aperture of 0.6, and the sharp one at 0.9.
+    // Sharp edges, and soft edges of 0.12 µm as in the reference phantoms; the pixel is included. Every measure of
+    // width depends on the aperture: σ fitted to intensity or absorbance, distances from 10 to 90 or 25 to 75 % and the
+    // steepest slope all grow by a third or more from 0.3 to 0.9. 0.64 ± 0.03 pixels is the soft edge up to an aperture
+    // of 0.6, and the sharp edge at 0.9.
     for (condenser_na, sigma_um, expected) in [
         (0.3, 0.03, 0.47),
         (0.41, 0.03, 0.48),
@@ -153,7 +154,7 @@ fn edges_in_focus_are_half_a_pixel_to_two_thirds_wide() {
 }
 
 #[test]
-fn widths_of_drawn_edges_are_found_in_noise() {
+fn widths_of_synthetic_edges_are_measured_in_noise() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(0xED6E);
     for sigma in [0.4, 0.9, 2.5] {
         let image: Vec<f32> = (0..64 * 64)
@@ -166,7 +167,7 @@ fn widths_of_drawn_edges_are_found_in_noise() {
         let fit = calibrate::edge(&image, 64, Window { left: 15, top: 16, width: 32, height: 32 }).unwrap();
         // The standard error is about 2 ∕ 80 of √(σ ∕ 32 px).
         assert!((fit.sigma_px - sigma).abs() < 0.03, "{sigma}: {}", fit.sigma_px);
-        assert!((fit.difference - 2.0).abs() < 0.2);
+        assert!((fit.rms_residual - 2.0).abs() < 0.2);
         assert!((fit.dark - 100.0).abs() < 0.5 && (fit.light - 180.0).abs() < 0.5);
     }
 }
@@ -180,17 +181,17 @@ fn lines_are_least_squares() {
 }
 
 #[test]
-fn stacks_that_cannot_be_measured_are_refused() {
+fn unusable_stacks_are_rejected() {
     let planes = stack(0.4, &nucleus(1), &[0.0], &[0.0, 1.0, 2.0, 3.0]);
     let planes = slices(&planes);
     let end = calibrate::focus(&planes, PIXELS, WINDOW).unwrap_err();
-    assert_eq!(end, Error::NoFocusInside { sharpest: 0, planes: 4 });
+    assert_eq!(end, Error::FocusAtStackEnd { sharpest: 0, planes: 4 });
     assert!(matches!(calibrate::focus(&planes[..2], PIXELS, WINDOW), Err(Error::OutOfRange { field: "stack", .. })));
     let outside = Window { left: 100, ..WINDOW };
     assert!(matches!(calibrate::focus(&planes, PIXELS, outside), Err(Error::Window { .. })));
     assert!(matches!(calibrate::edge(planes[0], PIXELS, Window { width: 2, ..WINDOW }), Err(Error::Window { .. })));
     let flat = vec![0.5; PIXELS * PIXELS];
-    let nothing = |error| matches!(error, Error::Nothing { .. });
+    let nothing = |error| matches!(error, Error::NothingToMeasure { .. });
     assert!(nothing(calibrate::focus(&[&flat, &flat, &flat], PIXELS, WINDOW).unwrap_err()));
     assert!(nothing(calibrate::edge(&flat, PIXELS, WINDOW).unwrap_err()));
     let unknown = vec![f32::NAN; PIXELS * PIXELS];
@@ -203,7 +204,7 @@ fn stacks_that_cannot_be_measured_are_refused() {
     assert!(calibrate::condenser(&planes, PIXELS, WINDOW, 1.0, &bad).unwrap_err().to_string().starts_with("na is 2"));
 }
 
-/// A folder of real images, or none with a message; on a build server there must be one.
+/// Returns a folder of real images, or `None` with a message. Required on CI.
 fn reference(folder: &str) -> Option<PathBuf> {
     let Some(root) = std::env::var_os("PAPSYNTH_REFERENCE") else {
         assert!(std::env::var("CI").as_deref() != Ok("true"), "PAPSYNTH_REFERENCE is not set");
@@ -213,14 +214,14 @@ fn reference(folder: &str) -> Option<PathBuf> {
     Some(PathBuf::from(root).join(folder))
 }
 
-/// Bounding boxes of what a mask shows.
+/// Returns bounding boxes of the objects in a mask.
 fn boxes(mask: &[u8], width: usize) -> Vec<[usize; 4]> {
-    let mut seen = vec![false; mask.len()];
+    let mut visited = vec![false; mask.len()];
     let mut found = Vec::new();
     for start in 0..mask.len() {
         let (mut open, mut bounds) = (vec![start], [width, mask.len(), 0, 0]);
         while let Some(i) = open.pop() {
-            if mask[i] == 0 || std::mem::replace(&mut seen[i], true) {
+            if mask[i] == 0 || std::mem::replace(&mut visited[i], true) {
                 continue;
             }
             let (x, y) = (i % width, i / width);
@@ -244,7 +245,7 @@ fn blur_in_a_real_stack_is_linear_and_symmetric() {
     let mask = read("nuclei.png".to_owned());
     let width = mask.width() as usize;
     let height = mask.height() as usize;
-    // σ by distance from focus, on either side.
+    // σ by distance from focus, on both sides.
     let mut sides = [const { [const { Vec::new() }; 9] }; 2];
     let mut measured = 0;
     for [left, top, right, bottom] in boxes(&mask, width) {

@@ -1,16 +1,17 @@
-//! Gibson and Lanni's point spread function against the reference arrays, and Airy's against its constants.
+//! Tests of Gibson and Lanni's point spread function against reference arrays, and of the Airy disc against its
+//! constants.
 
-#![expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "radii of few pixels")]
+#![expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "radii of a few pixels")]
 
 use crate::support::array;
 use optics_psf::{GibsonLanni, GibsonLanniParams};
 
-/// Pixels of the arrays, µm, and from the axis outward.
+/// Pixel size of the arrays in µm, and pixels from the axis outwards.
 const PIXEL_UM: f64 = 0.0625;
 const PIXELS: usize = 65;
 
-/// One row for each z; the mean over 3 x 3 places of each pixel, between radii a third of a pixel apart linearly, as
-/// the arrays have it.
+/// Returns one row per z. Pixels are means over 3 x 3 positions, interpolated linearly between radii a third of a pixel
+/// apart, as in the arrays.
 fn pixels(params: &GibsonLanniParams, z_um: &[f64]) -> Vec<f64> {
     let radii: Vec<f64> = (0..3 * PIXELS + 3).map(|i| i as f64 * PIXEL_UM / 3.0).collect();
     let profile = GibsonLanni::new(params).unwrap().profile(&radii, z_um).unwrap();
@@ -51,14 +52,14 @@ fn agrees_with_the_reference_arrays() {
     }
 }
 
-/// In focus, over distances in units of λ/NA.
+/// Returns the intensity in focus at distances in units of λ/NA.
 fn airy(r: &[f64]) -> Vec<f64> {
     let params = GibsonLanniParams { na: 0.5, wavelength_um: 0.5, ..GibsonLanniParams::default() };
     GibsonLanni::new(&params).unwrap().profile(r, &[0.0]).unwrap()
 }
 
 #[test]
-fn airys_disc_has_its_zeros_width_and_energy() {
+fn airy_disc_has_correct_zeros_width_and_energy() {
     let r: Vec<f64> = (0..40_000).map(|i| f64::from(i) * 1e-4).collect();
     let intensity = airy(&r);
     assert!((intensity[0] - 1.0).abs() < 1e-12);
@@ -69,7 +70,7 @@ fn airys_disc_has_its_zeros_width_and_energy() {
     assert!((dark[0] - 0.6098).abs() < 1e-3 && (dark[1] - 1.1166).abs() < 1e-3, "{dark:?}");
     let half = intensity.iter().position(|v| *v < 0.5).unwrap();
     assert!((2.0 * r[half] - 0.5145).abs() < 1e-3);
-    // Σ I 2πr dr; the whole is 1/π in these units: ∫ (2J₁(q)/q)² q dq = 2 with q = 2πr.
+    // Σ I 2πr dr; the total is 1/π in these units: ∫ (2J₁(q)/q)² q dq = 2 with q = 2πr.
     let energy = |to: f64| {
         let inside = r.iter().zip(&intensity).take_while(|(r, _)| **r <= to);
         inside.map(|(r, v)| v * r * 1e-4).sum::<f64>() * core::f64::consts::TAU * core::f64::consts::PI
@@ -79,7 +80,7 @@ fn airys_disc_has_its_zeros_width_and_energy() {
 }
 
 #[test]
-fn impossible_lenses_are_refused_by_name() {
+fn invalid_lenses_are_rejected_by_field() {
     let default = GibsonLanniParams::default();
     let cases = [
         ("na is 1.2", GibsonLanniParams { na: 1.2, ..default.clone() }),

@@ -3,8 +3,8 @@
 mod abbe;
 mod bright_field;
 mod calibrate;
+mod gaussian;
 mod gibson_lanni;
-mod laws;
 mod patches;
 #[path = "../support/mod.rs"]
 mod support;

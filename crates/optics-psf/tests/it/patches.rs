@@ -1,17 +1,17 @@
-//! Patches against whole pictures and Abbe's images, and their laws.
+//! Tests of patches against complete images and Abbe's images, and of invariants.
 
-#![expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small pictures in single precision")]
+#![expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small images in single precision")]
 
 use crate::support::{SIDE, absorbing, array, double, relative, shifted, single, soft_disk, worst};
 use optics_psf::{
-    Abbe, AbbeParams, BrightField, BrightFieldParams, Error, Factor, Focus, LEAST_LIGHT, Lattice, Layer, Light,
-    Microscope, MicroscopeParams, Padding, Patch, PatchImager, PatchScratch, Source, Zernike,
+    Abbe, AbbeParams, BrightField, BrightFieldParams, Error, Factor, Focus, Lattice, Layer, MIN_TRANSMITTANCE,
+    Microscope, MicroscopeParams, Padding, Patch, PatchImager, PatchScratch, Source, TransmittedLight, Zernike,
 };
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-/// Something on the slide: transmittances, phases or none, and where.
-struct Thing {
+/// An object on the slide: transmittances, optional phase delays, and position.
+struct Object {
     transmittance: Vec<f32>,
     phase: Vec<f32>,
     width: usize,
@@ -19,8 +19,8 @@ struct Thing {
     depth_um: f64,
 }
 
-impl Thing {
-    /// A whole tile of absorbance.
+impl Object {
+    /// Returns a complete tile of absorbance.
     fn tile(absorbance: &[f64], depth_um: f64) -> Self {
         let transmittance = absorbance.iter().map(|a| libm::exp10(-a) as f32).collect();
         Self { transmittance, phase: Vec::new(), width: SIDE, at_px: [0, 0], depth_um }
@@ -31,7 +31,7 @@ fn imager(params: &MicroscopeParams) -> PatchImager {
     PatchImager::new(&Microscope::new(params).unwrap())
 }
 
-/// Samples are pixels: the arrays' 0.125 µm.
+/// Returns parameters with one sample per pixel, the arrays' 0.125 µm.
 fn sampled(condenser_na: f64) -> MicroscopeParams {
     MicroscopeParams {
         condenser_na,
@@ -42,30 +42,30 @@ fn sampled(condenser_na: f64) -> MicroscopeParams {
     }
 }
 
-fn factor(imager: &PatchImager, thing: &Thing, focus: &Focus) -> Factor {
+fn factor(imager: &PatchImager, object: &Object, focus: &Focus) -> Factor {
     let (mut patch, mut factor) = (Patch::default(), Factor::default());
-    imager.load(&thing.transmittance, &thing.phase, thing.width, &mut patch);
+    imager.load(&object.transmittance, &object.phase, object.width, &mut patch);
     imager.expose(&mut patch, focus, &mut PatchScratch::default(), &mut factor);
     factor
 }
 
-/// A square picture.
-fn picture(imager: &PatchImager, things: &[Thing], side_px: usize, focus: impl Fn(f64) -> Focus) -> Vec<f64> {
-    let mut light = Light::new(imager.microscope(), side_px, side_px);
-    for thing in things {
-        light.multiply(&factor(imager, thing, &focus(thing.depth_um)), thing.at_px);
+/// Returns a square image.
+fn render(imager: &PatchImager, objects: &[Object], side_px: usize, focus: impl Fn(f64) -> Focus) -> Vec<f64> {
+    let mut light = TransmittedLight::new(imager.microscope(), side_px, side_px);
+    for object in objects {
+        light.multiply(&factor(imager, object, &focus(object.depth_um)), object.at_px);
     }
     let mut out = vec![0.0; side_px * side_px];
-    light.picture_into(&mut out);
+    light.image_into(&mut out);
     double(&out)
 }
 
-fn seen(imager: &PatchImager, things: &[Thing], side_px: usize) -> Vec<f64> {
-    picture(imager, things, side_px, |depth| imager.focus(depth, 0.0).unwrap())
+fn sample_image(imager: &PatchImager, objects: &[Object], side_px: usize) -> Vec<f64> {
+    render(imager, objects, side_px, |depth| imager.focus(depth, 0.0).unwrap())
 }
 
-/// Cells, leukocytes, bacilli and specks with some texture, at random places and depths.
-fn scene(seed: u64, side_px: i64) -> Vec<Thing> {
+/// Returns textured cells, leukocytes, bacilli and specks at random positions and depths.
+fn scene(seed: u64, side_px: i64) -> Vec<Object> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut uniform = |low: f64, high: f64| low + (high - low) * f64::from(rng.next_u32()) / 4_294_967_296.0;
     let kinds = [
@@ -75,24 +75,24 @@ fn scene(seed: u64, side_px: i64) -> Vec<Thing> {
         (40, 20, 0.15, 0.25, 4.0),
         (10, 6, 0.5, 0.9, 4.0),
     ];
-    let mut things = Vec::new();
+    let mut objects = Vec::new();
     for (count, width_px, absorbance, ratio, range) in kinds {
         for _ in 0..count {
             let width = 2 * width_px;
-            let middle = width as f64 / 2.0;
+            let centre = width as f64 / 2.0;
             let angle = uniform(0.0, core::f64::consts::PI);
             let (c, s) = (libm::cos(angle), libm::sin(angle));
             let clumps: Vec<[f64; 3]> =
-                (0..12).map(|_| [uniform(-middle, middle), uniform(-middle, middle), uniform(1.0, 4.0)]).collect();
+                (0..12).map(|_| [uniform(-centre, centre), uniform(-centre, centre), uniform(1.0, 4.0)]).collect();
             let sample = |k: usize| {
-                let [x, y] = [k % width, k / width].map(|v| v as f64 + 0.5 - middle);
+                let [x, y] = [k % width, k / width].map(|v| v as f64 + 0.5 - centre);
                 let (p, q) = (c * x + s * y, (c * y - s * x) / ratio);
-                let inside = ((middle - 1.0 - (p * p + q * q).sqrt()) * ratio + 0.5).clamp(0.0, 1.0);
+                let inside = ((centre - 1.0 - (p * p + q * q).sqrt()) * ratio + 0.5).clamp(0.0, 1.0);
                 let clump = |[u, v, r]: &[f64; 3]| libm::exp(-((x - u) * (x - u) + (y - v) * (y - v)) / (2.0 * r * r));
                 libm::exp10(-absorbance * inside * (1.0 + 0.6 * clumps.iter().map(clump).sum::<f64>())) as f32
             };
             let place = |v: f64| v as i64 - width_px as i64 / 2;
-            things.push(Thing {
+            objects.push(Object {
                 transmittance: (0..width * width).map(sample).collect(),
                 phase: Vec::new(),
                 width,
@@ -101,11 +101,11 @@ fn scene(seed: u64, side_px: i64) -> Vec<Thing> {
             });
         }
     }
-    things
+    objects
 }
 
 #[test]
-fn one_patch_is_the_whole_picture() {
+fn one_patch_matches_the_complete_image() {
     let disk = soft_disk(3.0, 0.5, 0.12);
     let coma = Zernike { coma: [0.05, 0.02], ..Zernike::default() };
     for (zernike, phase) in [(Zernike::default(), 0.0), (Zernike::default(), 0.4), (coma, 0.3)] {
@@ -122,15 +122,15 @@ fn one_patch_is_the_whole_picture() {
             };
             let whole = BrightField::new(imager.microscope(), &whole).unwrap();
             let mut specimen = whole.specimen();
-            let thing = Thing { phase: phase.clone(), ..Thing::tile(&disk, depth) };
-            whole.set_transmittance(&mut specimen, 0, &thing.transmittance);
+            let object = Object { phase: phase.clone(), ..Object::tile(&disk, depth) };
+            whole.set_transmittance(&mut specimen, 0, &object.transmittance);
             if !phase.is_empty() {
                 whole.set_phase(&mut specimen, 0, &phase);
             }
             let expected = double(&whole.image(&mut specimen, 0));
-            let error = worst(&seen(&imager, &[thing], SIDE / 2), &expected);
-            // Rounding of two grids of other sizes; with aberrations that have a side, the coarser table leaves faint echoes
-            // around.
+            let error = worst(&sample_image(&imager, &[object], SIDE / 2), &expected);
+            // Rounding errors of two grids of different sizes. With asymmetric aberrations, the coarser table causes
+            // faint echoes.
             let bound = if zernike == coma { 5e-4 } else { 2e-5 };
             assert!(error < bound, "{depth}: {error}");
         }
@@ -138,25 +138,25 @@ fn one_patch_is_the_whole_picture() {
 }
 
 #[test]
-fn many_patches_are_the_whole_picture() {
+fn many_patches_match_the_complete_image() {
     let imager = imager(&MicroscopeParams::default());
     let depths: Vec<f64> = (-4..=4).map(f64::from).collect();
     let side = 256;
-    let mut things = scene(0x5CE7E, side);
-    for thing in &mut things {
-        thing.depth_um = thing.depth_um.round();
+    let mut objects = scene(0x5CE7E, side);
+    for object in &mut objects {
+        object.depth_um = object.depth_um.round();
     }
-    // Things of one slab that touch are one thing to the lens: one of each two is left out.
-    let mut kept: Vec<Thing> = Vec::new();
-    for thing in things {
-        let apart = |other: &Thing| {
-            let centre = |t: &Thing, k: usize| t.at_px[k] as f64 + t.width as f64 / 4.0;
-            let [dx, dy] = [0, 1].map(|k| centre(&thing, k) - centre(other, k));
-            let reach = (thing.width + other.width) as f64 / 4.0 + 12.0;
-            other.depth_um != thing.depth_um || dx * dx + dy * dy > reach * reach
+    // Touching objects in one slab are imaged as one object: one of each pair is left out.
+    let mut kept: Vec<Object> = Vec::new();
+    for object in objects {
+        let apart = |other: &Object| {
+            let centre = |t: &Object, k: usize| t.at_px[k] as f64 + t.width as f64 / 4.0;
+            let [dx, dy] = [0, 1].map(|k| centre(&object, k) - centre(other, k));
+            let reach = (object.width + other.width) as f64 / 4.0 + 12.0;
+            other.depth_um != object.depth_um || dx * dx + dy * dy > reach * reach
         };
         if kept.iter().all(apart) {
-            kept.push(thing);
+            kept.push(object);
         }
     }
     assert!(kept.len() > 25, "{}", kept.len());
@@ -168,11 +168,11 @@ fn many_patches_are_the_whole_picture() {
     let mut specimen = whole.specimen();
     for (k, depth) in depths.iter().enumerate() {
         let mut slab = vec![1.0; wide * wide];
-        for thing in kept.iter().filter(|t| t.depth_um == *depth) {
-            for (i, t) in thing.transmittance.iter().enumerate() {
-                let [x, y] = [i % thing.width, i / thing.width];
+        for object in kept.iter().filter(|t| t.depth_um == *depth) {
+            for (i, t) in object.transmittance.iter().enumerate() {
+                let [x, y] = [i % object.width, i / object.width];
                 let place = |at: i64, v: usize| (2 * (at + margin as i64)) as usize + v;
-                slab[place(thing.at_px[1], y) * wide + place(thing.at_px[0], x)] *= t;
+                slab[place(object.at_px[1], y) * wide + place(object.at_px[0], x)] *= t;
             }
         }
         whole.set_transmittance(&mut specimen, k, &slab);
@@ -180,12 +180,12 @@ fn many_patches_are_the_whole_picture() {
     let all = double(&whole.image(&mut specimen, 0));
     let (row, side) = (wide / 2, side as usize);
     let expected: Vec<f64> = (0..side * side).map(|i| all[(i / side + margin) * row + i % side + margin]).collect();
-    let error = relative(&seen(&imager, &kept, side), &expected);
+    let error = relative(&sample_image(&imager, &kept, side), &expected);
     assert!(error < 1e-3, "{error}");
 }
 
 #[test]
-fn what_margins_cut_off_is_below_a_thousandth_of_the_contrast() {
+fn light_beyond_margins_is_below_a_thousandth_of_the_contrast() {
     let disc = |width: usize, absorbance: f64| {
         let sample = |k: usize| {
             let [x, y] = [k % width, k / width].map(|v| v as f64 + 0.5 - width as f64 / 2.0);
@@ -194,23 +194,23 @@ fn what_margins_cut_off_is_below_a_thousandth_of_the_contrast() {
         };
         (width, (0..width * width).map(sample).collect::<Vec<f32>>())
     };
-    let mut seen = Vec::new();
+    let mut errors_beyond = Vec::new();
     for (condenser_na, cover_error_um) in [(0.3, 0.0), (0.41, 0.0), (0.6, 0.0), (0.9, 0.0), (0.5, 10.0)] {
         let imager = imager(&MicroscopeParams { condenser_na, cover_error_um, ..MicroscopeParams::default() });
         for (width, transmittance) in [disc(12, 0.6), disc(64, 0.5), disc(160, 0.1)] {
             for depth_um in [0.0, -0.6, -1.3, 2.5, -5.0, -8.0] {
                 let focus = imager.focus(depth_um, 0.0).unwrap();
-                let thing =
-                    Thing { transmittance: transmittance.clone(), phase: Vec::new(), width, at_px: [0, 0], depth_um };
-                let found = factor(&imager, &thing, &focus);
-                // The same with as much of empty slide around it.
+                let object =
+                    Object { transmittance: transmittance.clone(), phase: Vec::new(), width, at_px: [0, 0], depth_um };
+                let found = factor(&imager, &object, &focus);
+                // The same with an additional margin of empty slide.
                 let more = 2 * 96;
                 let wide = width + 2 * more;
                 let mut padded = vec![1.0; wide * wide];
                 for (k, t) in transmittance.iter().enumerate() {
                     padded[(k / width + more) * wide + k % width + more] = *t;
                 }
-                let all = factor(&imager, &Thing { transmittance: padded, width: wide, ..thing }, &focus);
+                let all = factor(&imager, &Object { transmittance: padded, width: wide, ..object }, &focus);
                 let offset = more / if found.lattice == Lattice::Object { 1 } else { 2 };
                 let height = found.values.len() / found.width;
                 let inside = |v: usize, len: usize| (offset..offset + len).contains(&v);
@@ -226,27 +226,27 @@ fn what_margins_cut_off_is_below_a_thousandth_of_the_contrast() {
                 });
                 let wrapped = wrapped.fold(0.0, f32::max) / contrast;
                 assert!(outside < 1.5e-3 && wrapped < 1.5e-3, "{condenser_na} {width} {depth_um}: {outside} {wrapped}");
-                seen.push(outside.max(wrapped));
+                errors_beyond.push(outside.max(wrapped));
             }
         }
     }
-    seen.sort_by(f32::total_cmp);
-    assert!(seen[seen.len() / 2] < 2.5e-4, "{}", seen[seen.len() / 2]);
+    errors_beyond.sort_by(f32::total_cmp);
+    assert!(errors_beyond[errors_beyond.len() / 2] < 2.5e-4, "{}", errors_beyond[errors_beyond.len() / 2]);
 }
 
 #[test]
-fn what_was_exposed_before_makes_no_difference() {
+fn factors_do_not_depend_on_earlier_exposures() {
     let imager = imager(&MicroscopeParams::default());
-    let things = scene(3, 64);
+    let objects = scene(3, 64);
     let focuses = [0.0, 0.7, -1.5, 3.0, 9.0, 0.2].map(|z| imager.focus(z, 0.5).unwrap());
     assert!(focuses.iter().any(|f| f.margin_px() != focuses[0].margin_px()));
     let (mut patch, mut scratch, mut out) = (Patch::default(), PatchScratch::default(), Factor::default());
-    for thing in [&things[0], &things[20], &things[4]] {
-        imager.load(&thing.transmittance, &thing.phase, thing.width, &mut patch);
+    for object in [&objects[0], &objects[20], &objects[4]] {
+        imager.load(&object.transmittance, &object.phase, object.width, &mut patch);
         for focus in &focuses {
             imager.expose(&mut patch, focus, &mut scratch, &mut out);
-            assert_eq!(out, factor(&imager, thing, focus));
-            let inner = thing.width / if out.lattice == Lattice::Object { 1 } else { 2 };
+            assert_eq!(out, factor(&imager, object, focus));
+            let inner = object.width / if out.lattice == Lattice::Object { 1 } else { 2 };
             let margin = focus.margin_px() * if out.lattice == Lattice::Object { 2 } else { 1 };
             assert_eq!(
                 (out.width, out.values.len()),
@@ -257,7 +257,7 @@ fn what_was_exposed_before_makes_no_difference() {
 }
 
 #[test]
-fn things_that_overlap_at_two_depths_are_within_2_percent_of_abbe() {
+fn overlapping_objects_at_two_depths_are_within_2_percent_of_abbe() {
     let disk: Vec<f64> = shifted(&soft_disk(3.0, 0.5, 0.12), -10, 6).iter().map(|a| 0.6 * a).collect();
     let Some(asym) = array("ref_asym_absorbance") else { return };
     let asym = shifted(&asym, 8, -4);
@@ -269,16 +269,17 @@ fn things_that_overlap_at_two_depths_are_within_2_percent_of_abbe() {
         for depths in [[2.0, -3.0], [0.0, 3.0], [0.0, 1.0], [-1.0, 4.0], [3.0, 4.0]] {
             let layers: [Layer; 2] = [absorbing(depths[0], &disk), absorbing(depths[1], &asym)];
             let reference = abbe.image(&layers, 0.0).unwrap();
-            let things = [Thing::tile(&disk, depths[0]), Thing::tile(&asym, depths[1])];
-            let error = relative(&seen(&imager(&params), &things, SIDE), &reference);
+            let objects = [Object::tile(&disk, depths[0]), Object::tile(&asym, depths[1])];
+            let error = relative(&sample_image(&imager(&params), &objects, SIDE), &reference);
             assert!(error < 0.02, "{condenser_na} {depths:?}: {error}");
         }
     }
 }
 
 #[test]
-fn things_at_one_depth_are_best_one_patch() {
-    // Apart by 1 µm, or one on the other and far larger, two patches do; where edges meet, they should be one.
+fn objects_at_one_depth_need_one_patch() {
+    // Two patches are accurate for objects 1 µm apart, or for a small object on a far larger one. Objects whose edges
+    // meet need one patch.
     let params = sampled(0.6);
     let imager = imager(&params);
     let source = Source::Lattice { stride: 2 };
@@ -294,8 +295,8 @@ fn things_at_one_depth_are_best_one_patch() {
         let sum: Vec<f64> = pair[0].iter().zip(&pair[1]).map(|(a, b)| a + b).collect();
         for (depth, scale) in [(0.0, 0.4), (2.0, 1.0)] {
             let reference = abbe.image(&[absorbing(depth, &sum)], 0.0).unwrap();
-            let separate = seen(&imager, &[Thing::tile(&pair[0], depth), Thing::tile(&pair[1], depth)], SIDE);
-            let joint = seen(&imager, &[Thing::tile(&sum, depth)], SIDE);
+            let separate = sample_image(&imager, &[Object::tile(&pair[0], depth), Object::tile(&pair[1], depth)], SIDE);
+            let joint = sample_image(&imager, &[Object::tile(&sum, depth)], SIDE);
             let errors = [relative(&separate, &reference), relative(&joint, &reference)];
             assert!(errors[0] < apart_at_2 * scale && errors[1] < joint_at_2 * scale, "{depth}: {errors:?}");
         }
@@ -303,14 +304,14 @@ fn things_at_one_depth_are_best_one_patch() {
 }
 
 #[test]
-fn depths_matter_to_a_sixteenth_of_a_um() {
+fn depth_rounding_error_is_visible_to_a_sixteenth_of_a_um() {
     let imager = imager(&MicroscopeParams::default());
     for seed in 0..2 {
-        let things = scene(seed, 256);
-        let exact = seen(&imager, &things, 256);
+        let objects = scene(seed, 256);
+        let exact = sample_image(&imager, &objects, 256);
         let rounded = |step: f64| {
             let focus = |depth: f64| imager.focus((depth / step).round() * step, 0.0).unwrap();
-            relative(&picture(&imager, &things, 256, focus), &exact)
+            relative(&render(&imager, &objects, 256, focus), &exact)
         };
         let errors = [1.0, 0.5, 0.25, 0.0625].map(rounded);
         assert!(errors[3] < 0.003, "{errors:?}");
@@ -319,37 +320,37 @@ fn depths_matter_to_a_sixteenth_of_a_um() {
 }
 
 #[test]
-fn what_an_image_shows_can_be_taken_out_of_focus() {
+fn refocused_images_match_the_defocused_object() {
     let Some(asym) = array("ref_asym_absorbance") else { return };
     for (condenser_na, bound) in [(0.41, 0.01), (0.9, 0.01)] {
         let imager = imager(&MicroscopeParams { condenser_na, ..MicroscopeParams::default() });
-        let truth = |depth: f64| seen(&imager, &[Thing::tile(&asym, depth)], SIDE / 2);
+        let truth = |depth: f64| sample_image(&imager, &[Object::tile(&asym, depth)], SIDE / 2);
         let taken = single(&enlarged(&truth(0.0), SIDE / 2));
         for depth in [0.0, 0.5, 1.0, 2.0, 4.0, -3.0] {
-            let thing = || Thing { transmittance: taken.clone(), ..Thing::tile(&asym, depth) };
-            let again = picture(&imager, &[thing()], SIDE / 2, |z| imager.refocus(z, 0.0).unwrap());
-            let blurred_twice = seen(&imager, &[thing()], SIDE / 2);
+            let object = || Object { transmittance: taken.clone(), ..Object::tile(&asym, depth) };
+            let again = render(&imager, &[object()], SIDE / 2, |z| imager.refocus(z, 0.0).unwrap());
+            let blurred_twice = sample_image(&imager, &[object()], SIDE / 2);
             let error = |image: &[f64]| relative(image, &truth(depth));
             assert!(error(&again) < bound, "{condenser_na} {depth}: {}", error(&again));
             assert!(error(&again) < error(&blurred_twice), "{condenser_na} {depth}");
         }
     }
-    // Aberrations with a side too.
+    // Also with asymmetric aberrations.
     let zernike = Zernike { coma: [0.06, 0.0], ..Zernike::default() };
     let imager =
         imager(&MicroscopeParams { condenser_na: 0.6, bandwidth_um: 0.0, zernike, ..MicroscopeParams::default() });
-    let truth = |depth: f64| seen(&imager, &[Thing::tile(&asym, depth)], SIDE / 2);
+    let truth = |depth: f64| sample_image(&imager, &[Object::tile(&asym, depth)], SIDE / 2);
     let taken = single(&enlarged(&truth(0.0), SIDE / 2));
     for depth in [0.0, 2.0] {
-        let thing = Thing { transmittance: taken.clone(), ..Thing::tile(&asym, depth) };
-        let again = picture(&imager, &[thing], SIDE / 2, |z| imager.refocus(z, 0.0).unwrap());
+        let object = Object { transmittance: taken.clone(), ..Object::tile(&asym, depth) };
+        let again = render(&imager, &[object], SIDE / 2, |z| imager.refocus(z, 0.0).unwrap());
         assert!(relative(&again, &truth(depth)) < 0.012, "{depth}: {}", relative(&again, &truth(depth)));
     }
 }
 
-/// Two samples for each pixel, by Catmull and Rom's cubics.
+/// Upsamples by two with Catmull–Rom cubics.
 fn enlarged(image: &[f64], width: usize) -> Vec<f64> {
-    // A sample lies a quarter of a pixel from the middle of its pixel.
+    // A sample is a quarter of a pixel from the centre of its pixel.
     const WEIGHTS: [f64; 4] = [-0.023_437_5, 0.226_562_5, 0.867_187_5, -0.070_312_5];
     let at = |v: i64| v.clamp(0, width as i64 - 1) as usize;
     let taps = |sample: usize| {
@@ -365,32 +366,32 @@ fn enlarged(image: &[f64], width: usize) -> Vec<f64> {
 }
 
 #[test]
-fn floors_are_counted_and_empty_patches_are_light() {
+fn clipped_values_are_counted_and_empty_patches_have_unit_intensity() {
     let imager = imager(&MicroscopeParams { condenser_na: 0.6, ..MicroscopeParams::default() });
-    let deep = Thing::tile(&soft_disk(3.0, 3.0, 0.12), 3.0);
+    let deep = Object::tile(&soft_disk(3.0, 3.0, 0.12), 3.0);
     let found = factor(&imager, &deep, &imager.focus(3.0, 0.0).unwrap());
-    assert!(found.floored > 20);
-    assert_eq!(found.values.iter().filter(|v| **v == LEAST_LIGHT).count(), found.floored);
-    let empty = Thing { phase: vec![0.0; SIDE * SIDE], ..Thing::tile(&[0.0; SIDE * SIDE], 0.0) };
+    assert!(found.clipped > 20);
+    assert_eq!(found.values.iter().filter(|v| **v == MIN_TRANSMITTANCE).count(), found.clipped);
+    let empty = Object { phase: vec![0.0; SIDE * SIDE], ..Object::tile(&[0.0; SIDE * SIDE], 0.0) };
     for depth in [0.0, 6.0] {
         let found = factor(&imager, &empty, &imager.focus(depth, 0.0).unwrap());
-        assert!(found.floored == 0 && found.values.iter().all(|v| *v == 1.0));
+        assert!(found.clipped == 0 && found.values.iter().all(|v| *v == 1.0));
     }
 }
 
 #[test]
-fn stray_light_lifts_the_dark() {
+fn stray_light_brightens_dark_regions() {
     let params = MicroscopeParams { stray_light: 0.1, ..MicroscopeParams::default() };
     let microscope = Microscope::new(&params).unwrap();
     let glaring = PatchImager::new(&microscope);
-    let things = scene(9, 96);
+    let objects = scene(9, 96);
     let clean = imager(&MicroscopeParams::default());
-    let (lit, dark) = (seen(&glaring, &things, 96), seen(&clean, &things, 96));
+    let (lit, dark) = (sample_image(&glaring, &objects, 96), sample_image(&clean, &objects, 96));
     assert!(lit.iter().zip(&dark).all(|(l, d)| (l - (0.1 + 0.9 * d)).abs() < 1e-6));
 }
 
 #[test]
-fn margins_and_lattices_are_functions_of_the_distance_from_focus() {
+fn margins_and_lattices_depend_on_defocus_only() {
     let imager = imager(&MicroscopeParams::default());
     let focus = |depth, stage| imager.focus(depth, stage).unwrap();
     let mut margins: Vec<usize> = (0..40).map(|z| focus(0.5 * f64::from(z), 0.0).margin_px()).collect();
@@ -403,34 +404,34 @@ fn margins_and_lattices_are_functions_of_the_distance_from_focus() {
 }
 
 #[test]
-fn light_outside_the_picture_is_left_out() {
+fn light_outside_the_image_is_ignored() {
     let imager = imager(&MicroscopeParams::default());
-    let things = scene(5, 128);
-    let all = seen(&imager, &things, 128);
-    let mut moved = things;
-    for thing in &mut moved {
-        thing.at_px = thing.at_px.map(|v| v - 40);
+    let objects = scene(5, 128);
+    let all = sample_image(&imager, &objects, 128);
+    let mut moved = objects;
+    for object in &mut moved {
+        object.at_px = object.at_px.map(|v| v - 40);
     }
-    let part = seen(&imager, &moved, 64);
+    let part = sample_image(&imager, &moved, 64);
     assert!((0..64 * 64).all(|i| part[i] == all[(i / 64 + 40) * 128 + i % 64 + 40]));
-    let mut light = Light::new(imager.microscope(), 64, 64);
+    let mut light = TransmittedLight::new(imager.microscope(), 64, 64);
     let speck = factor(&imager, &moved[55], &imager.focus(0.0, 0.0).unwrap());
     for far in [[-1000, 3], [3, 1 << 40], [64 + 12, 0]] {
         light.multiply(&speck, far);
     }
     light.multiply(&Factor::default(), [0, 0]);
     let mut out = vec![0.0; 64 * 64];
-    light.picture_into(&mut out);
+    light.image_into(&mut out);
     assert_eq!(out, vec![1.0; 64 * 64]);
     light.multiply(&speck, [30, 30]);
     light.clear();
-    light.picture_into(&mut out);
+    light.image_into(&mut out);
     assert_eq!(out, vec![1.0; 64 * 64]);
-    Light::new(imager.microscope(), 0, 0).picture_into(&mut []);
+    TransmittedLight::new(imager.microscope(), 0, 0).image_into(&mut []);
 }
 
 #[test]
-fn impossible_depths_are_refused_by_name() {
+fn invalid_depths_are_rejected_by_name() {
     let imager = imager(&MicroscopeParams::default());
     let named = |result: Result<Focus, Error>| result.unwrap_err().to_string();
     assert!(named(imager.focus(f64::NAN, 0.0)).starts_with("depth_um is NaN"));
@@ -438,29 +439,29 @@ fn impossible_depths_are_refused_by_name() {
 }
 
 #[test]
-#[should_panic(expected = "of another imager")]
-fn imagers_do_not_share_patches() {
+#[should_panic(expected = "belongs to another imager")]
+fn patches_of_another_imager_panic() {
     let [a, b] =
         [0.4, 0.6].map(|condenser_na| imager(&MicroscopeParams { condenser_na, ..MicroscopeParams::default() }));
-    factor(&a, &Thing::tile(&[0.0; SIDE * SIDE], 0.0), &b.focus(0.0, 0.0).unwrap());
+    factor(&a, &Object::tile(&[0.0; SIDE * SIDE], 0.0), &b.focus(0.0, 0.0).unwrap());
 }
 
 #[test]
-#[should_panic(expected = "whole pixels")]
-fn patches_are_whole_pixels() {
+#[should_panic(expected = "multiple of the oversampling")]
+fn incomplete_pixels_panic() {
     imager(&MicroscopeParams::default()).load(&[1.0; 15], &[], 5, &mut Patch::default());
 }
 
 #[test]
-fn threads_share_one_imager() {
+fn imagers_can_be_shared_between_threads() {
     fn shared<T: Send + Sync>(_: &T) {}
     let imager = imager(&MicroscopeParams::default());
     shared(&imager);
-    let things = scene(11, 96);
-    let one = |thing: &Thing| factor(&imager, thing, &imager.focus(thing.depth_um, 0.25).unwrap());
-    let alone: Vec<Factor> = things.iter().map(one).collect();
+    let objects = scene(11, 96);
+    let one = |object: &Object| factor(&imager, object, &imager.focus(object.depth_um, 0.25).unwrap());
+    let alone: Vec<Factor> = objects.iter().map(one).collect();
     let together: Vec<Factor> = std::thread::scope(|scope| {
-        let threads: Vec<_> = things.iter().map(|thing| scope.spawn(move || one(thing))).collect();
+        let threads: Vec<_> = objects.iter().map(|object| scope.spawn(move || one(object))).collect();
         threads.into_iter().map(|thread| thread.join().unwrap()).collect()
     });
     assert!(alone == together);

@@ -1,4 +1,4 @@
-//! Laws of the transfer functions, and their reference table.
+//! Tests of the transfer functions: invariants, and a reference table.
 
 use crate::support;
 use core::f64::consts::{PI, TAU};
@@ -11,7 +11,7 @@ fn transfer(condenser_na: f64, depth_um: f64) -> Transfer {
 }
 
 #[test]
-fn agrees_with_the_reference_table() {
+fn transfer_matches_the_reference_table() {
     let Some(path) = support::fixture("ref_wotf_radial.csv") else { return };
     let text = std::fs::read_to_string(path).unwrap();
     let rows: Vec<Vec<f64>> =
@@ -32,7 +32,7 @@ fn agrees_with_the_reference_table() {
 }
 
 #[test]
-fn constants_pass_and_nothing_beyond_the_cutoff() {
+fn constants_pass_and_frequencies_beyond_the_cutoff_do_not() {
     for (condenser_na, depth, stage) in [(0.4, 0.0, 0.0), (0.6, 3.0, -1.0), (1.2, -2.0, 0.5)] {
         let microscope = microscope(condenser_na);
         let transfer = microscope.transfer(depth, stage).unwrap();
@@ -61,7 +61,7 @@ fn full_aperture_in_focus_is_incoherent() {
 fn narrow_aperture_is_coherent() {
     let transfer = transfer(1e-4, -3.0);
     let gamma = |f: f64| ((1.515 / 0.57) * (1.515 / 0.57) - f * f).sqrt();
-    // At the entries of the table: between them a fringe is cut by the chord.
+    // At the table entries only: linear interpolation flattens fringes.
     for i in 0..390 {
         let f = f64::from(i) / 400.0 * microscope(1e-4).cutoff();
         let turn = TAU * 3.0 * (gamma(f) - gamma(0.0));
@@ -71,14 +71,14 @@ fn narrow_aperture_is_coherent() {
 }
 
 #[test]
-fn geometric_limit() {
+fn large_defocus_has_the_geometric_limit() {
     let sin = 0.3_f64 / 1.515;
     let q = TAU * 0.05 * 10.0 * sin / (1.0 - sin * sin).sqrt();
     let expected = 2.0 * libm::j1(q) / q;
     assert!((expected - 0.9505).abs() < 1e-4);
     assert!((transfer(0.3, 10.0).absorption([0.05, 0.0])[0] - expected).abs() < 5e-4);
     assert!((TAU * 0.05 * microscope(0.3).cone_radius_um(10.0, 0.0) - q).abs() < 1e-12);
-    // A depth in the mountant and a travel in air, one against the other.
+    // A depth in the mountant and a stage position in air, with opposite effects.
     let tan = |sin: f64| sin / (1.0 - sin * sin).sqrt();
     for (depth, stage) in [(3.0, 0.0), (0.0, 2.0), (4.0, -1.0), (4.0, 3.0)] {
         let expected: f64 = depth * tan(0.6 / 1.515) - stage * tan(0.6);
@@ -87,7 +87,7 @@ fn geometric_limit() {
 }
 
 #[test]
-fn sides_of_focus_differ_by_the_sign_of_the_phase() {
+fn phase_transfer_changes_sign_through_focus() {
     for (depth, stage) in [(2.0, 0.0), (3.0, -1.3), (0.0, 4.0)] {
         let microscope = microscope(0.6);
         let (a, b) = (microscope.transfer(depth, stage).unwrap(), microscope.transfer(-depth, -stage).unwrap());
@@ -100,8 +100,8 @@ fn sides_of_focus_differ_by_the_sign_of_the_phase() {
 }
 
 #[test]
-fn a_travel_in_air_focuses_what_lies_deeper() {
-    // Paraxially a depth d in index n is undone by lowering the stage by −d/n.
+fn stage_movement_in_air_focuses_a_larger_depth() {
+    // Paraxially, lowering the stage by −d/n compensates a depth d in index n.
     let params = MicroscopeParams { na: 0.2, condenser_na: 0.15, ..MicroscopeParams::default() };
     let microscope = Microscope::new(&params).unwrap();
     let focused = microscope.transfer(-40.0, -40.0 / 1.515).unwrap();
@@ -114,7 +114,7 @@ fn a_travel_in_air_focuses_what_lies_deeper() {
 }
 
 #[test]
-fn an_aberration_without_direction_needs_no_direction() {
+fn symmetric_aberrations_do_not_depend_on_the_table() {
     let round = Zernike { defocus: 0.1, spherical: -0.05, ..Zernike::default() };
     let sided = Zernike { astigmatism: [0.0, 1e-12], ..round };
     let make = |zernike| {
@@ -133,7 +133,7 @@ fn an_aberration_without_direction_needs_no_direction() {
 }
 
 #[test]
-fn transfer_with_coma_is_that_of_a_real_image() {
+fn transfer_with_coma_gives_real_images() {
     let zernike = Zernike { coma: [0.2, 0.1], astigmatism: [0.1, 0.0], ..Zernike::default() };
     let params = MicroscopeParams { condenser_na: 0.6, bandwidth_um: 0.0, zernike, ..MicroscopeParams::default() };
     let transfer = Microscope::new(&params).unwrap().transfer(1.5, 0.0).unwrap();
@@ -150,12 +150,12 @@ fn transfer_with_coma_is_that_of_a_real_image() {
 }
 
 #[test]
-fn bandwidth_blurs_the_fringes() {
+fn bandwidth_reduces_fringe_contrast() {
     let make = |bandwidth_um| {
         let params = MicroscopeParams { condenser_na: 0.1, bandwidth_um, ..MicroscopeParams::default() };
         Microscope::new(&params).unwrap().transfer(20.0, 0.0).unwrap()
     };
-    // The contrast of the third fringe sinks with the band, and a narrow one is like none.
+    // A wide band reduces the contrast of the third fringe; a narrow band does not.
     let swing = |transfer: &Transfer| {
         (0..150).map(|i| transfer.absorption([0.4 + 0.002 * f64::from(i), 0.0])[0]).fold(0.0, f64::max)
     };
@@ -170,8 +170,8 @@ fn light_outside_the_objectives_aperture_is_lost() {
 }
 
 #[test]
-fn strehl_ratios_of_the_cover_glass_and_of_small_aberrations() {
-    /// |∫ exp 2πiW|² over the pupil, relative to that without W.
+fn strehl_ratios_of_cover_glass_and_small_aberrations() {
+    /// |∫ exp 2πiW|² over the pupil, relative to W = 0.
     fn strehl(microscope: &Microscope, stage_um: f64) -> f64 {
         let (na, points) = (microscope.params().na, 20_000);
         let mut sum = [0.0; 2];
@@ -194,7 +194,7 @@ fn strehl_ratios_of_the_cover_glass_and_of_small_aberrations() {
         |zernike| strehl(&Microscope::new(&MicroscopeParams { zernike, ..MicroscopeParams::default() }).unwrap(), 0.0);
     let marechal = libm::exp(-(TAU * 0.05) * (TAU * 0.05));
     assert!((marechal - 0.90602).abs() < 1e-5);
-    // Squares of orthonormal terms add, whichever two there are.
+    // Squares of orthonormal terms add, for every pair of terms.
     for (i, j) in (0..6).flat_map(|i| (i..6).map(move |j| (i, j))) {
         let [defocus, a, b, c, d, spherical] = core::array::from_fn(|k| match (k == i, k == j) {
             (true, true) => 0.05,
@@ -208,7 +208,7 @@ fn strehl_ratios_of_the_cover_glass_and_of_small_aberrations() {
 }
 
 #[test]
-fn defaults_are_the_papers_lens() {
+fn defaults_match_the_paper() {
     let params = MicroscopeParams::default();
     assert_eq!((params.na, params.wavelength_um, params.pixel_um), (0.95, 0.57, 0.25));
     assert_eq!(Microscope::new(&params).unwrap().pitch_um(), 0.125);
@@ -216,7 +216,7 @@ fn defaults_are_the_papers_lens() {
 }
 
 #[test]
-fn impossible_microscopes_are_refused_by_name() {
+fn invalid_microscopes_are_rejected_by_field() {
     let default = MicroscopeParams::default();
     let cases: [(&str, MicroscopeParams); 14] = [
         ("na is 1.2", MicroscopeParams { na: 1.2, ..default.clone() }),

@@ -1,11 +1,7 @@
-//! Reference arrays of the repository, which a packaged crate leaves out.
+//! Reference arrays of the repository. The packaged crate does not contain them.
 
-#![allow(dead_code, reason = "each test uses a part of it")]
-#![expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "small grids, and single precision images"
-)]
+#![allow(dead_code, reason = "each test uses a part of the module")]
+#![expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small grids and single precision images")]
 
 use std::path::PathBuf;
 
@@ -13,7 +9,7 @@ use optics_psf::{Layer, Microscope, MicroscopeParams};
 
 pub(crate) const SIDE: usize = 128;
 
-/// None, with a message, where the repository's fixtures are not there.
+/// Returns the path of a fixture, or `None` with a message if the repository's fixtures are missing.
 pub(crate) fn fixture(name: &str) -> Option<PathBuf> {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/optics").join(name);
     if path.exists() {
@@ -24,23 +20,23 @@ pub(crate) fn fixture(name: &str) -> Option<PathBuf> {
     None
 }
 
-/// Numbers of an array of little-endian doubles.
+/// Reads an array of little-endian doubles.
 pub(crate) fn array(name: &str) -> Option<Vec<f64>> {
     let bytes = std::fs::read(fixture(&format!("{name}.f64"))?).expect("the array can be read");
     Some(bytes.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect())
 }
 
-/// The paper's lens at 0.57 µm alone, with another condenser; samples 0.125 µm apart.
+/// Returns the paper's microscope at 0.57 µm with another condenser aperture; samples are 0.125 µm apart.
 pub(crate) fn microscope(condenser_na: f64) -> Microscope {
     Microscope::new(&MicroscopeParams { condenser_na, bandwidth_um: 0.0, ..MicroscopeParams::default() }).unwrap()
 }
 
-/// A layer of absorbance in double precision.
+/// Returns a layer of absorbance given in double precision.
 pub(crate) fn absorbing(depth_um: f64, absorbance: &[f64]) -> Layer {
     Layer::new(depth_um, absorbance.iter().map(|a| [libm::exp10(-0.5 * a), 0.0]).collect()).unwrap()
 }
 
-/// The difference of two images as a share of the reference's contrast: ‖I − R‖ / ‖1 − R‖.
+/// Returns the difference of two images relative to the contrast of the reference: ‖I − R‖ / ‖1 − R‖.
 pub(crate) fn relative(image: &[f64], reference: &[f64]) -> f64 {
     let square = |differences: &mut dyn Iterator<Item = f64>| differences.map(|d| d * d).sum::<f64>();
     let error = square(&mut image.iter().zip(reference).map(|(a, b)| a - b));
@@ -60,14 +56,14 @@ pub(crate) fn double(values: &[f32]) -> Vec<f64> {
     values.iter().map(|v| f64::from(*v)).collect()
 }
 
-/// An image moved right and down on the periodic grid.
+/// Shifts an image right and down on the periodic grid.
 pub(crate) fn shifted(image: &[f64], right: i32, down: i32) -> Vec<f64> {
     let side = SIDE as i32;
     let source = |x: i32, y: i32| ((y - down).rem_euclid(side) * side + (x - right).rem_euclid(side)) as usize;
     (0..side).flat_map(|y| (0..side).map(move |x| image[source(x, y)])).collect()
 }
 
-/// A disc of radius `radius_um` whose edge is a normal distribution.
+/// Returns a disc whose edge profile is a normal distribution function.
 pub(crate) fn soft_disk(radius_um: f64, height: f64, edge_um: f64) -> Vec<f64> {
     let at = |i: usize| {
         let [x, y] = [i % SIDE, i / SIDE].map(|v| (v as f64 - SIDE as f64 / 2.0) * 0.125);
@@ -76,12 +72,12 @@ pub(crate) fn soft_disk(radius_um: f64, height: f64, edge_um: f64) -> Vec<f64> {
     (0..SIDE * SIDE).map(at).collect()
 }
 
-/// Absorbance and phase of the arrays of objects that refract.
+/// Returns absorbance and phase delay of the reference arrays of refracting objects.
 pub(crate) fn phase_object() -> (Vec<f64>, Vec<f64>) {
     (soft_disk(3.0, 0.1, 0.12), soft_disk(3.0, 0.3, 0.25))
 }
 
-/// The discrete spectrum for kx and ky from −reach to reach.
+/// Returns the discrete spectrum for kx and ky from −`reach` to `reach`.
 pub(crate) fn coefficients(image: &[f64], reach: i32) -> Vec<[f64; 2]> {
     let wave: Vec<[f64; 2]> = (0..SIDE)
         .map(|i| {

@@ -1,16 +1,17 @@
-//! What can be typed after `calibrate`.
+//! Options of `calibrate`.
 
 use std::path::PathBuf;
 
 use clap::{ArgGroup, Args};
 use papsynth_calibrate::{Instrument, Window};
 
-use super::values::parse_pixel;
+use super::values::{integer, parse_pixel};
 
 /// Measure a microscope and its camera on your own images.
 ///
-/// A focus stack of nuclei gives the blur against the distance from focus and the condenser's aperture; a straight edge
-/// gives the blur in focus; flat frames give the camera's gain and noise. Prints tables, and writes plots, parts of recipes, and `calibration.json` with all numbers.
+/// A focus stack of nuclei gives the blur as a function of focus and the condenser aperture; a straight edge gives the
+/// blur in focus; flat frames give gain and noise of the camera. Prints tables, and writes plots, sections of recipes,
+/// and `calibration.json` with all numbers.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("images").required(true).multiple(true).args(["stack", "edge", "flat"]), after_help = "\
 Examples:
@@ -21,45 +22,47 @@ Examples:
   papsynth calibrate --flat flats --dark darks --bits 12
   papsynth preview calibration/optics.toml
 
-Images are PNG or TIFF in grey, in the order of the numbers in their names. The planes of a stack
-lie at equal distances, on both sides of focus, and nothing else among them. Without --window nuclei
-are found: dark, compact, sharp things; the law is that of their medians. Without --step-um it is in
-planes, without --pixel-um in pixels, and what lacks a length goes into no recipe.
+Images are grey PNG or TIFF files, ordered by the numbers in their names. The planes of a stack have
+equal distances and lie on both sides of focus; the folder holds no other images. Without --window,
+nuclei are found automatically as dark, compact, sharp objects, and the fit uses their medians.
+Without --step-um, distances are in planes; without --pixel-um, blur is in pixels. Such values are
+not written to recipes.
 
-Flats are frames of an even field, two or more of each light, from near dark to the brightest, and
-two or more in the dark. Unevenness wider than 15 pixels is taken for the lamp's. A folder of flats
-holds a subfolder for each light, and one named `dark`,
+Flats are images of an even field: 2 or more per level, from near dark to bright, and 2 or more dark
+frames. Variations wider than 15 pixels count as illumination. A folder of flats holds either a
+subfolder per level and one named `dark`,
   flats/dark/1.tif  flats/dark/2.tif  flats/5ms/1.tif  flats/5ms/2.tif  flats/9ms/1.tif ...
-or files alone, of which each two after one another by name are of the same light:
+or only files, where two consecutive files, by name, have the same light:
   flats/01a.tif  flats/01b.tif  flats/02a.tif  flats/02b.tif ...  darks/1.tif  darks/2.tif
 
-What an older run left in the folder of --out is kept where this run does not measure it again.")]
+Older measurements in the folder of --out are kept, unless this run measures them again.")]
 pub(crate) struct Calibrate {
-    /// Focus stack of a nucleus or more: a TIFF of several pages, a folder, or images
+    /// Focus stack of one or more nuclei: a TIFF with several pages, a folder, or images
     #[arg(long, value_name = "FILE|DIR", num_args = 1..)]
     pub(crate) stack: Vec<PathBuf>,
-    /// Travel of the stage from plane to plane, in micrometres
+    /// Distance between planes, in micrometres of stage travel
     #[arg(long, value_name = "UM", value_parser = parse_step, requires = "stack")]
     pub(crate) step_um: Option<f64>,
-    /// Where a nucleus lies in the stack, in pixels; repeatable [default: found]
+    /// Window of a nucleus, in pixels; repeatable [default: found automatically]
     #[arg(long, value_name = "X,Y,W,H", value_parser = parse_window, requires = "stack")]
     pub(crate) window: Vec<Window>,
     /// Image of a sharp straight edge in focus
     #[arg(long, value_name = "FILE")]
     pub(crate) edge: Option<PathBuf>,
-    /// Line across the edge or along it, in pixels: the square of its length around its middle is looked at [default: found]
+    /// Line across or along the edge, in pixels; the square of its length around its centre is measured [default: found
+    /// automatically]
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = parse_line, requires = "edge", allow_hyphen_values = true)]
     pub(crate) line: Option<[f64; 4]>,
-    /// Folder of flat frames: a subfolder for each light, or pairs of files
+    /// Folder of flat frames: a subfolder per level, or pairs of files
     #[arg(long, value_name = "DIR")]
     pub(crate) flat: Option<PathBuf>,
-    /// Folder of frames taken in the dark [default: the subfolder `dark` of that of --flat]
+    /// Folder of dark frames [default: the subfolder `dark` of --flat]
     #[arg(long, value_name = "DIR", requires = "flat")]
     pub(crate) dark: Option<PathBuf>,
-    /// Bits of the camera, which files of 16 bits do not tell [default: 8 for files of 8 bits]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=16), requires = "flat")]
+    /// Bit depth of the camera; required for 16-bit files [default: 8 for 8-bit files]
+    #[arg(long, value_name = "N", value_parser = integer(8, 16_u32), requires = "flat")]
     pub(crate) bits: Option<u32>,
-    /// Size of a pixel in the object, in micrometres
+    /// Pixel size in the object plane, in micrometres
     #[arg(long, value_name = "UM", value_parser = parse_pixel)]
     pub(crate) pixel_um: Option<f64>,
     /// Numerical aperture of the objective
@@ -71,10 +74,10 @@ pub(crate) struct Calibrate {
     /// Refractive index of the mountant
     #[arg(long, value_name = "N", default_value_t = Instrument::default().mount_index)]
     pub(crate) mount_index: f64,
-    /// Refractive index between cover glass and objective: 1 dry, 1.515 oil
+    /// Refractive index of the immersion medium: 1 for air, 1.515 for oil
     #[arg(long, value_name = "N", default_value_t = Instrument::default().immersion_index)]
     pub(crate) immersion_index: f64,
-    /// Folder to write to; older calibrations in it are replaced, no other file
+    /// Output folder; replaces older calibrations in it, but no other file
     #[arg(long, value_name = "DIR", default_value = "calibration")]
     pub(crate) out: PathBuf,
 }
@@ -86,16 +89,16 @@ fn parse_step(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Four numbers between commas.
+/// Parses four numbers, separated by commas.
 fn parse_four<T: std::str::FromStr>(text: &str) -> Option<[T; 4]> {
     let numbers: Vec<T> = text.split(',').map(|part| part.trim().parse().ok()).collect::<Option<_>>()?;
     numbers.try_into().ok()
 }
 
 fn parse_window(text: &str) -> Result<Window, String> {
-    let [left, top, width, height] = parse_four(text)
-        .ok_or("expected X,Y,W,H: left, top, width and height in whole pixels, such as 120,80,48,52")?;
-    // No image is so large; sums of them never overflow.
+    let [left, top, width, height] =
+        parse_four(text).ok_or("expected X,Y,W,H: left, top, width and height in pixels, for example 120,80,48,52")?;
+    // Larger than any image, and sums do not overflow.
     match [left, top, width, height].iter().all(|v| *v <= 1 << 20) {
         true => Ok(Window { left, top, width, height }),
         false => Err("expected numbers up to 1048576".to_owned()),
@@ -104,5 +107,5 @@ fn parse_window(text: &str) -> Result<Window, String> {
 
 fn parse_line(text: &str) -> Result<[f64; 4], String> {
     let line = parse_four(text).filter(|line| line.iter().all(|v: &f64| v.is_finite()));
-    line.ok_or_else(|| "expected X0,Y0,X1,Y1: two points in pixels, such as 40,10,40,60".to_owned())
+    line.ok_or_else(|| "expected X0,Y0,X1,Y1: two points in pixels, for example 40,10,40,60".to_owned())
 }

@@ -1,4 +1,4 @@
-//! What can be typed after `generate`, `preview` and `render`.
+//! Options of `generate`, `preview` and `render`.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -6,14 +6,15 @@ use std::path::PathBuf;
 use clap::{ArgGroup, Args};
 
 use super::shared::{EngineArgs, LayoutArgs, RecipeArgs};
-use super::values::parse_range;
+use super::values::{integer, parse_range};
 use crate::memory::parse_size;
-use crate::share::ShareArgs;
+use crate::task::TaskArgs;
 
-/// Make images and their truth.
+/// Generate images with ground truth.
 ///
-/// The same recipe, model and seed give the same pixels, labels and tables on any machine, whatever the number of threads and
-/// however the frames are split into ranges. Running the same command again completes what is missing and touches nothing that is whole.
+/// The same recipe, model and seed give the same pixels, labels and tables on any machine, for any number of threads
+/// and any split of the frames into ranges or tasks. Run the same command again to write missing frames; complete
+/// frames are not written again.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("which").required(true).args(["frames", "range"]), after_help = "\
 Examples:
@@ -21,54 +22,55 @@ Examples:
   papsynth generate my.toml --out fields --frames 1000 --seed 7
   papsynth generate --preset dense --out dense --range 500..1000     the second half, on another machine
   papsynth generate --out sets --frames 200 --format folder,cellpose,yolo-seg
-  papsynth generate my.toml --out many --frames 100000 --shard 3/20   the fourth of twenty machines
-  papsynth generate my.toml --out s3://bucket/many --frames 100000    keys from AWS_ACCESS_KEY_ID and the like
+  papsynth generate my.toml --out many --frames 100000 --task 3/20    task 3 of 0 to 19
+  papsynth generate my.toml --out s3://bucket/many --frames 100000    keys from AWS_ACCESS_KEY_ID and related variables
   papsynth generate wide.toml --out wide --frames 20 --max-memory 2GiB
-  papsynth generate --out timed --frames 20 --threads 1 --profile   where the time goes
+  papsynth generate --out timed --frames 20 --threads 1 --profile     time of each stage
   papsynth generate --out stacks --frames 4 --set focus.planes=21 --set focus.step_um=0.5
   papsynth generate --out few --frames 8 --set 'cells.intermediate.count={ uniform = [2, 6] }'")]
 pub(crate) struct Generate {
     #[command(flatten)]
     pub(crate) engine: EngineArgs,
-    /// Folder of the data set: new, empty, or one that this command began; or s3://, gs://, az://, bucket and prefix, in builds with --features cloud
+    /// Folder of the data set: new, empty, or written by the same command; in builds with --features cloud also an
+    /// object store (s3://, gs:// or az:// with bucket and prefix)
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
-    /// Number of frames: those with index 0 to N − 1
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    /// Number of frames to generate
+    #[arg(long, value_name = "N", value_parser = integer(1, u64::MAX))]
     pub(crate) frames: Option<u64>,
-    /// Indices of the frames, from A up to but without B
+    /// Indices of the frames to generate, from A to B − 1
     #[arg(long, value_name = "A..B", value_parser = parse_range)]
     pub(crate) range: Option<Range<u64>>,
     #[command(flatten)]
     pub(crate) layout: LayoutArgs,
     #[command(flatten)]
-    pub(crate) share: ShareArgs,
-    /// Read every file that is there, as `papsynth verify` does, and make anew what is wrong, instead of comparing sizes
+    pub(crate) task: TaskArgs,
+    /// Check the content of files that are already present, not only their sizes, and repair invalid files
     #[arg(long)]
     pub(crate) verify: bool,
-    /// Memory to use at most, such as 2GiB: fewer frames are made side by side if need be [default: 80 % of what is available, where the
-    /// system tells]
+    /// Memory limit, for example 2GiB; fewer frames are generated at the same time if needed [default: 80 % of the
+    /// available memory, on Linux]
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     pub(crate) max_memory: Option<u64>,
-    /// Say where the time went, stage by stage, and how many pixels and objects a second were made
+    /// Print the time of each stage, and pixels and objects per second
     #[arg(long, conflicts_with = "quiet")]
     pub(crate) profile: bool,
-    /// Say nothing but errors
+    /// Print errors only
     #[arg(long, short, conflicts_with = "json")]
     pub(crate) quiet: bool,
-    /// Say everything as JSON, one object a line, on standard output
+    /// Print progress, result and errors as JSON on standard output, one object per line
     #[arg(long)]
     pub(crate) json: bool,
 }
 
 impl Generate {
-    /// Indices of the frames that are asked for.
+    /// Indices of the frames to generate.
     pub(crate) fn indices(&self) -> Range<u64> {
         self.range.clone().unwrap_or(0..self.frames.unwrap_or(1))
     }
 }
 
-/// Make one field and show it beside its truth.
+/// Generate one field and show it next to its ground truth.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -78,18 +80,21 @@ Examples:
 pub(crate) struct Preview {
     #[command(flatten)]
     pub(crate) engine: EngineArgs,
-    /// Picture to write; an older picture is replaced, no other file
+    /// PNG to write; replaces an older image of papsynth, but no other file
     #[arg(long, value_name = "FILE", default_value = "preview.png")]
     pub(crate) out: PathBuf,
-    /// Which frame of the data set
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    /// Replace any existing file
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Index of the frame
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = integer(0, u64::MAX))]
     pub(crate) index: u64,
 }
 
-/// Render one scene, which may have been edited or made by another program.
+/// Render one scene, which may have been edited or written by another program.
 ///
-/// `papsynth generate --scenes` writes the scene of each frame as JSON. With the same recipe and model an unchanged scene gives the same
-/// image, bit by bit. The image of a focus stack is the one with every object in focus.
+/// `papsynth generate --scenes` writes the scene of each frame as JSON. An unchanged scene with the same recipe and
+/// model gives the same pixels. The image of a focus stack is the one with every object in focus.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -99,16 +104,19 @@ Examples:
 pub(crate) struct Render {
     #[command(flatten)]
     pub(crate) recipe: RecipeArgs,
-    /// Model that `papsynth learn` wrote, or a class file (TOML), beside the classes that ship
+    /// Model of `papsynth learn`, or class file (TOML), in addition to the built-in classes
     #[arg(long, value_name = "FILE")]
     pub(crate) model: Option<PathBuf>,
     /// Scene to render; `-` reads standard input
     #[arg(long, value_name = "FILE")]
     pub(crate) scene: PathBuf,
-    /// PNG to write; an older picture is replaced, no other file
+    /// PNG to write; replaces an older image of papsynth, but no other file
     #[arg(long, value_name = "FILE", default_value = "scene.png")]
     pub(crate) out: PathBuf,
-    /// Threads to work with; the bytes are the same with any number [default: one a core]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    /// Replace any existing file
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Number of threads; does not change the output [default: the number of cores]
+    #[arg(long, value_name = "N", value_parser = integer(1, 1024_u16))]
     pub(crate) threads: Option<u16>,
 }

@@ -1,4 +1,4 @@
-//! What can be typed after `judge` and `match`.
+//! Options of `judge` and `match`.
 
 use std::path::PathBuf;
 
@@ -6,66 +6,71 @@ use clap::Args;
 use papsynth::recipe::Preset;
 use papsynth_judge::NucleiFrom;
 
-use super::values::{named, parse_pixel, preset_parser};
+use super::values::{integer, named, parse_pixel, preset_parser};
 
-/// Tell synthetic fields from real ones, and say what gives them away.
+/// Test whether synthetic fields can be distinguished from real ones, and list the distinguishing features.
 ///
-/// A classifier learns to tell nuclei, free cells and patches of both sides apart, and is tried on fields that it has not
-/// seen; the same between halves of the real fields shows what chance does. Beside it stand the paper's Q-Q slopes of nuclear texture
-/// and statistics of whole fields. Writes report.html, a page that needs nothing else, and report.json with the same numbers.
+/// Classifiers are trained on nuclei, free cells and patches, and tested on fields outside the training set. The same
+/// test between halves of the real fields gives the result expected by chance. The report also has the Q-Q slopes of
+/// nuclear texture of the paper and statistics of complete fields. Writes report.html, a page without external files,
+/// and report.json with the same numbers.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   papsynth judge slides fields --pixel-um 0.33 --out report
-  papsynth judge slides fields --pixel-um 0.33 --group N --out report      negative fields alone
+  papsynth judge slides fields --pixel-um 0.33 --group N --out report      only negative fields
   papsynth judge slides other-slides --pixel-um 0.33 --synthetic-pixel-um 0.25 --out report
 
-REAL and SYNTHETIC are each a data set of `papsynth generate`, or a folder of PNG or TIFF images
-(16 bits are fine, of colours green is looked at), where what is known may lie beside them:
-  NAME.csv     points in the nuclei of NAME.png, one `y,x` a line
-  masks/       masks or label images of nuclei, of the same names
-  frames.csv   the group of each image: `frame,grade`
-Nuclei are taken from masks if all fields of both sides have them, else around points if all have
-those or masks, else they are found: always in the same way on both sides. If pixels differ in size,
-the finer side is averaged to the coarser. The page shows pieces of the images.")]
+REAL and SYNTHETIC are each a data set of `papsynth generate`, or a folder of PNG or TIFF images of
+8 or 16 bits; of colour images the green channel is used. A folder may also hold:
+  NAME.csv     points in the nuclei of NAME.png, one `y,x` per line
+  masks/       masks or label images of nuclei, with the names of the images
+  frames.csv   the group of each image, with the columns `frame,grade`
+Nuclei come from masks if all fields of both sides have them, else from points if all fields have
+points or masks, else they are found automatically: always in the same way on both sides. If pixel
+sizes differ, the side with smaller pixels is averaged to the larger size. The page shows parts of
+the images.")]
 pub(crate) struct Judge {
-    /// Folder of real fields; two or more
+    /// Folder with 2 or more real fields
     #[arg(value_name = "REAL")]
     pub(crate) real: PathBuf,
-    /// Folder of synthetic fields; two or more
+    /// Folder with 2 or more synthetic fields
     #[arg(value_name = "SYNTHETIC")]
     pub(crate) synthetic: PathBuf,
-    /// Folder to write to; an older report in it is replaced, no other file
+    /// Output folder; replaces an older report in it, but no other file
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
-    /// Size of a pixel of the real fields, in micrometres [default: as recorded, else that of the other side]
+    /// Pixel size of the real fields, in micrometres [default: as recorded, else that of the other side]
     #[arg(long, value_name = "UM", value_parser = parse_pixel)]
     pub(crate) pixel_um: Option<f64>,
-    /// Size of a pixel of the synthetic fields, in micrometres [default: as recorded, else that of the other side]
+    /// Pixel size of the synthetic fields, in micrometres [default: as recorded, else that of the other side]
     #[arg(long, value_name = "UM", value_parser = parse_pixel)]
     pub(crate) synthetic_pixel_um: Option<f64>,
-    /// Look at fields of this group alone, on each side that has it; repeatable
+    /// Use only fields of this group, on each side with groups; repeatable
     #[arg(long, value_name = "NAME")]
     pub(crate) group: Vec<String>,
-    /// Where nuclei are known from [default: masks if all fields have them, else points, else search]
-    #[arg(long, value_name = "HOW", value_parser = named(NucleiFrom::ALL, NucleiFrom::name))]
+    /// Source of nuclei [default: masks if all fields have them, else points, else search]
+    #[arg(long, value_name = "SOURCE", value_parser = named(NucleiFrom::ALL, NucleiFrom::name))]
     pub(crate) nuclei: Option<NucleiFrom>,
-    /// Seed of all that is drawn
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    /// Seed of the random numbers
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = integer(0, u64::MAX))]
     pub(crate) seed: u64,
-    /// Fewer trees, halvings and draws: for a first look
+    /// Use fewer trees, splits and resamples, for a first impression
     #[arg(long)]
     pub(crate) quick: bool,
-    /// Threads to work with; the numbers are the same with any [default: one a core]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    /// Number of threads; does not change the report [default: the number of cores]
+    #[arg(long, value_name = "N", value_parser = integer(1, 1024_u16))]
     pub(crate) threads: Option<u16>,
+    /// Print errors only
+    #[arg(long, short)]
+    pub(crate) quiet: bool,
 }
 
-/// Find the recipe of fields like real ones.
+/// Find the recipe whose fields resemble real ones.
 ///
-/// Light and noise are measured; the rest is searched by simulation: recipes from all over a range of possibilities are drawn and
-/// imaged, regressions learn from them what statistics of fields say of parameters, and a search ends at the recipe
-/// whose fields come nearest. Every number comes with a 95 % interval; what the fields do not tell is named and left as it was.
+/// Light and noise are measured. All other parameters are estimated by simulation: random recipes are imaged,
+/// regressions predict parameters from statistics of fields, and a search minimizes the distance to the real fields.
+/// Every value has a 95 % interval. Parameters that the fields do not determine are listed and keep their values.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -74,56 +79,52 @@ Examples:
   papsynth match slides --find-pixel --quick --out mine.toml
   papsynth generate mine.toml --out fields --frames 20
 
-REAL is a folder as `papsynth judge` takes them: images of one size, and beside them, if they are known, masks of nuclei.
-Without masks nuclei are searched for, in real and simulated fields alike; points are not used, as they are seldom of all nuclei.
-Five to ten fields will do; of one alone no spread between fields can be told.")]
+REAL is a folder as for `papsynth judge`: images of one size, and masks of nuclei if available. Without
+masks, nuclei are found automatically in real and simulated fields; points are not used, because they
+rarely mark all nuclei. Use 5 to 10 fields; one field does not show the variation between fields.
+
+The time grows with the number of simulations: the progress line shows the time left.")]
 pub(crate) struct Match {
     /// Folder of real fields
     #[arg(value_name = "REAL")]
     pub(crate) real: PathBuf,
-    /// Recipe to write; an older match of this name is replaced, no other file
+    /// Recipe to write; replaces an older recipe of papsynth match, but no other file
     #[arg(long, value_name = "FILE")]
     pub(crate) out: PathBuf,
-    /// The recipe to begin with
+    /// Replace any existing file
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Built-in recipe to begin with [default: lbc]
     #[arg(long, value_name = "NAME", value_parser = preset_parser(), default_value = Preset::Lbc.name(), hide_default_value = true)]
     pub(crate) preset: Preset,
-    /// Size of a pixel, in micrometres [default: as recorded]
+    /// Pixel size, in micrometres [default: as recorded]
     #[arg(long, value_name = "UM", value_parser = parse_pixel)]
     pub(crate) pixel_um: Option<f64>,
-    /// Find the size of a pixel too, taking cells to be as large as the recipe to begin with says
+    /// Also estimate the pixel size, from the cell size of the initial recipe
     #[arg(long)]
     pub(crate) find_pixel: bool,
-    /// Look at fields of this group alone; repeatable
+    /// Use only fields of this group; repeatable
     #[arg(long, value_name = "NAME")]
     pub(crate) group: Vec<String>,
-    /// Windows of 640 x 480 pixels to simulate, 60 or more, which takes most of the time [default: 2000]
-    #[arg(long, value_name = "N", value_parser = parse_budget, conflicts_with = "quick")]
-    pub(crate) budget: Option<usize>,
-    /// Simulate a sixth as much: wider intervals, fewer parameters
+    /// Number of simulated windows of 640 x 480 pixels, which take most of the time [default: 2000]
+    #[arg(long, value_name = "N", value_parser = integer(60, 1_000_000_usize), conflicts_with = "quick")]
+    pub(crate) simulations: Option<usize>,
+    /// Use a sixth of the simulations: wider intervals, fewer parameters
     #[arg(long)]
     pub(crate) quick: bool,
-    /// Model that `papsynth learn` wrote, or a class file (TOML), beside the classes that ship
+    /// Model of `papsynth learn`, or class file (TOML), in addition to the built-in classes
     #[arg(long, value_name = "FILE")]
     pub(crate) model: Option<PathBuf>,
-    /// Write all that was found here too, as JSON
+    /// Also write all results to this file, as JSON
     #[arg(long, value_name = "FILE")]
     pub(crate) report: Option<PathBuf>,
-    /// Seed of all that is drawn
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    /// Seed of the random numbers
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = integer(0, u64::MAX))]
     pub(crate) seed: u64,
-    /// Threads to work with; the recipe is the same with any number [default: one a core]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    /// Number of threads; does not change the recipe [default: the number of cores]
+    #[arg(long, value_name = "N", value_parser = integer(1, 1024_u16))]
     pub(crate) threads: Option<u16>,
-    /// Do not tell how far the work is
-    #[arg(long)]
+    /// Print no progress
+    #[arg(long, short)]
     pub(crate) quiet: bool,
-}
-
-fn parse_budget(text: &str) -> Result<usize, String> {
-    /// Fewer windows teach nothing.
-    const ALLOWED: std::ops::RangeInclusive<usize> = 60..=1_000_000;
-    match text.parse() {
-        Ok(value) if ALLOWED.contains(&value) => Ok(value),
-        _ => Err(format!("expected {} to {} windows", ALLOWED.start(), ALLOWED.end())),
-    }
 }

@@ -1,4 +1,4 @@
-//! What can be typed after `learn`.
+//! Options of `learn`.
 
 use std::path::PathBuf;
 
@@ -6,10 +6,10 @@ use clap::{ArgGroup, Args};
 
 use super::values::parse_pixel;
 
-/// Learn what cells of a class are like, from real material.
+/// Learn a class of cells from real images and outlines.
 ///
-/// Reads nuclei with their masks, and cytoplasm as outlines or label images, and writes one model file for
-/// `papsynth generate --model`. What is not given is kept as the base model has it.
+/// Reads nuclei with masks, and cytoplasm as outlines or label images, and writes a model file for `papsynth generate
+/// --model`. Properties without data keep the values of the base model.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("material").required(true).multiple(true)
     .args(["nuclei", "nucleus_outlines", "outlines", "labels"]), after_help = "\
@@ -19,51 +19,55 @@ Examples:
       --base mine.json --numbers-only --out mine.json
   papsynth learn --class parabasal --like intermediate --labels fields --pixel-um 0.33 --out mine.json
 
-Images are PNG or TIFF in grey; a mask or label image is 0 outside. An outline file is CSV with the columns
-outline, k, x_px, y_px: name of the outline, number of its point from 0, and its place in pixels.")]
+Images are grey PNG or TIFF files; masks and label images are 0 outside the objects. An outline file is
+a CSV file with the columns outline, k, x_px, y_px: name of the outline, index of the point from 0, and
+its position in pixels.")]
 pub(crate) struct Learn {
-    /// Class that is learned: new, or one of the base model's to learn anew
+    /// Class to learn: a new class, or a class of the base model to replace
     #[arg(long, value_name = "NAME", value_parser = parse_class)]
     pub(crate) class: String,
-    /// Folder of nuclei: `images` and `masks` in it hold files of the same names
+    /// Folder of nuclei, with the subfolders `images` and `masks` of files with equal names
     #[arg(long, value_name = "DIR")]
     pub(crate) nuclei: Option<PathBuf>,
-    /// Folder of the masks, where they are elsewhere; then `--nuclei` holds the images themselves
+    /// Folder of the masks, if `--nuclei` holds only the images
     #[arg(long, value_name = "DIR", requires = "nuclei")]
     pub(crate) masks: Option<PathBuf>,
-    /// Outlines of nuclei, instead of those of their masks
+    /// Outlines of nuclei, instead of those of the masks
     #[arg(long, value_name = "FILE.csv")]
     pub(crate) nucleus_outlines: Option<PathBuf>,
-    /// Outlines of whole cells
+    /// Outlines of cells
     #[arg(long, value_name = "FILE.csv", conflicts_with = "labels")]
     pub(crate) outlines: Option<PathBuf>,
-    /// Folder of label images of whole cells; those at an image's border are left out
+    /// Folder of label images of cells; cells at the border of an image are ignored
     #[arg(long, value_name = "DIR")]
     pub(crate) labels: Option<PathBuf>,
-    /// Size of a pixel of all of them, in micrometres
+    /// Pixel size of all images and outlines, in micrometres
     #[arg(long, value_name = "UM", value_parser = parse_pixel)]
     pub(crate) pixel_um: f64,
-    /// Class of the base model to take after in what the material does not show [default: the class itself]
+    /// Class of the base model for properties without data [default: the class itself]
     #[arg(long, value_name = "NAME")]
     pub(crate) like: Option<String>,
-    /// Category of the Bethesda system, such as NILM or HSIL [default: that of the class it takes after]
+    /// Category of the Bethesda system, such as NILM or HSIL [default: that of `--like`]
     #[arg(long, value_name = "NAME")]
     pub(crate) bethesda: Option<String>,
-    /// Where the material came from, for the record [default: the names of the files]
+    /// Source of the data, for the record [default: the names of the files]
     #[arg(long, value_name = "TEXT")]
     pub(crate) source: Option<String>,
-    /// Model to learn into [default: the one that ships]
+    /// Base model [default: the built-in model]
     #[arg(long, value_name = "MODEL")]
     pub(crate) base: Option<PathBuf>,
-    /// Keep means, covariances and spectra of this class alone, and no pixels
+    /// Store only means, covariances and spectra of this class, no pixels
     #[arg(long)]
     pub(crate) numbers_only: bool,
-    /// Model file to write; an older model is replaced, no other file
+    /// Model file to write; replaces an older model, but no other file
     #[arg(long, value_name = "MODEL.json")]
     pub(crate) out: PathBuf,
+    /// Replace any existing file
+    #[arg(long)]
+    pub(crate) force: bool,
 }
 
-/// A name that can stand in a recipe without quotes.
+/// Parses a name that needs no quotes in a recipe.
 fn parse_class(text: &str) -> Result<String, String> {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     match !text.is_empty() && text.chars().all(plain) {

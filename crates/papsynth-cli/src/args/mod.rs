@@ -1,4 +1,4 @@
-//! What can be typed.
+//! The command line.
 
 #[cfg(feature = "calibrate")]
 mod calibrate;
@@ -14,21 +14,24 @@ mod values;
 #[cfg(feature = "web")]
 mod web;
 
+use std::borrow::Cow;
 use std::ffi::OsString;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, Parser, Subcommand};
+use clap::error::{ContextKind, ContextValue};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use papsynth::recipe::Preset;
-use papsynth_dataset::Home;
+use papsynth_dataset::Location;
 
-use crate::exit::Failure;
+use crate::exit::{ExitError, escaped};
 
 #[cfg(not(feature = "calibrate"))]
-use LeftOut as Calibrate;
+use MissingFeature as Calibrate;
 #[cfg(not(feature = "completions"))]
-use LeftOut as Completions;
+use MissingFeature as Completions;
 #[cfg(not(feature = "learn"))]
-use LeftOut as Learn;
+use MissingFeature as Learn;
 #[cfg(feature = "calibrate")]
 pub(crate) use calibrate::Calibrate;
 pub(crate) use generate::{Generate, Preview, Render};
@@ -45,11 +48,11 @@ use values::preset_parser;
 #[cfg(feature = "web")]
 pub(crate) use web::{Study, View};
 #[cfg(not(feature = "judge"))]
-use {LeftOut as Judge, LeftOut as Match};
+use {MissingFeature as Judge, MissingFeature as Match};
 #[cfg(not(feature = "web"))]
-use {LeftOut as Study, LeftOut as View};
+use {MissingFeature as Study, MissingFeature as View};
 
-/// Synthetic bright-field images of cervical smears, with exact truth.
+/// Synthetic bright-field images of cervical smears with exact ground truth.
 #[derive(Debug, Parser)]
 #[command(
     name = "papsynth",
@@ -57,21 +60,21 @@ use {LeftOut as Study, LeftOut as View};
     max_term_width = 100,
     after_help = "\
 Examples:
-  papsynth generate --out fields --frames 8            eight labelled fields of the default recipe
-  papsynth init --preset dense --out dense.toml        a commented recipe to change
-  papsynth preview dense.toml                          one field beside its truth
+  papsynth generate --out fields --frames 8            generate 8 labelled fields of the default recipe
+  papsynth init --preset dense --out dense.toml        write a commented recipe to edit
+  papsynth preview dense.toml                          show one field next to its ground truth
   papsynth generate dense.toml --out dense --frames 100
 
-Exit codes: 0 done; 2 usage, recipe or input (trying again will not help); 74 input/output (it may);
-130 interrupted (run the same command again to go on)."
+Exit codes: 0 success; 2 error in usage, recipe or input; 74 input/output error, such as a full disk;
+130 interrupted: run the same command again to continue."
 )]
 pub(crate) struct Cli {
-    /// What to do.
+    /// The subcommand.
     #[command(subcommand)]
     pub(crate) verb: Verb,
 }
 
-/// What to do.
+/// The subcommands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Verb {
     Init(Init),
@@ -99,7 +102,7 @@ pub(crate) enum Verb {
     Completions(Completions),
 }
 
-/// Print a commented recipe to start from.
+/// Print a commented recipe to edit.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -107,23 +110,26 @@ Examples:
   papsynth init --preset high-grade --out my.toml
   papsynth init --list")]
 pub(crate) struct Init {
-    /// The recipe to print
+    /// Built-in recipe to print [default: lbc]
     #[arg(long, value_name = "NAME", value_parser = preset_parser(), default_value = Preset::Lbc.name(), hide_default_value = true)]
     pub(crate) preset: Preset,
-    /// Write to this new file instead of standard output
+    /// Write to this file instead of standard output
     #[arg(long, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
-    /// List the presets
+    /// Replace an existing file
+    #[arg(long, requires = "out")]
+    pub(crate) force: bool,
+    /// List the built-in recipes
     #[arg(long, conflicts_with_all = ["preset", "out"])]
     pub(crate) list: bool,
 }
 
-/// Print the JSON schema of recipes.
+/// Print the JSON schema of recipes, for editors.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  papsynth schema > papsynth-recipe.schema.json")]
 pub(crate) struct SchemaArgs {}
 
-/// Print what makes a shell complete papsynth's words.
+/// Print a script for shell completion.
 #[cfg(feature = "completions")]
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -131,28 +137,62 @@ Examples:
   papsynth completions bash > ~/.local/share/bash-completion/completions/papsynth
   papsynth completions zsh > ~/.zfunc/_papsynth")]
 pub(crate) struct Completions {
-    /// The shell
+    /// Shell
     #[arg(value_enum)]
     pub(crate) shell: clap_complete::Shell,
 }
 
-// A subcommand that this program was built without. What follows is its help.
+// The arguments of a subcommand without its feature. The doc comment is its help.
 /// Not in this build.
 #[derive(Debug, Args)]
-#[allow(dead_code, reason = "a program with all features lacks none")]
-pub(crate) struct LeftOut {
-    /// Whatever is typed after it
+#[allow(dead_code, reason = "a build with all features has all subcommands")]
+pub(crate) struct MissingFeature {
+    /// All other arguments
     #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
     words: Vec<OsString>,
 }
 
-/// An address where only folders are known would become a folder of that name, and so would one that is mistyped.
-pub(crate) fn check_addresses(verb: &Verb, words: impl IntoIterator<Item = OsString>) -> Result<(), Failure> {
+/// Options of earlier releases, and their new names.
+const RENAMED: [(&str, &str); 3] = [("--shard", "--task"), ("--strays", "--untracked"), ("--budget", "--simulations")];
+
+/// Parses a command line. Negative numbers are values, so that the message for them states the accepted range.
+pub(crate) fn parse(words: impl IntoIterator<Item = OsString>) -> Result<Cli, clap::Error> {
+    fn with_negative_numbers(command: clap::Command) -> clap::Command {
+        let relaxed = command.mut_args(|arg| {
+            let takes_number = !arg.is_positional() && arg.get_action().takes_values();
+            if takes_number { arg.allow_negative_numbers(true) } else { arg }
+        });
+        relaxed.mut_subcommands(with_negative_numbers)
+    }
+    let matches = with_negative_numbers(Cli::command()).try_get_matches_from(words).map_err(|mut error| {
+        let renamed = match error.get(ContextKind::InvalidArg) {
+            Some(ContextValue::String(option)) => RENAMED.iter().find(|(old, _)| option == old),
+            _ => None,
+        };
+        if let (clap::error::ErrorKind::UnknownArgument, Some((_, new))) = (error.kind(), renamed) {
+            error.insert(ContextKind::SuggestedArg, ContextValue::String((*new).to_owned()));
+        }
+        error
+    })?;
+    Cli::from_arg_matches(&matches)
+}
+
+/// Prints help or an error of [`parse`], with control characters of the command line escaped.
+pub(crate) fn print_error(error: &clap::Error) -> std::io::Result<()> {
+    let text = error.render().to_string();
+    match escaped(&text) {
+        Cow::Borrowed(_) => error.print(),
+        Cow::Owned(text) => write!(std::io::stderr().lock(), "{text}"),
+    }
+}
+
+/// Rejects addresses of object stores where a folder is expected, and misspelled addresses: both would become folders.
+pub(crate) fn check_addresses(verb: &Verb, words: impl IntoIterator<Item = OsString>) -> Result<(), ExitError> {
     let words: Vec<_> = words.into_iter().collect();
     if let Some((word, address)) = words.iter().find_map(|word| Some((word, mistyped(word.to_str()?)?))) {
-        let message = format!("{}: begins as an address of an object store and is none", word.display());
-        let help = format!("write {address} for an object store, ./{} for a folder", word.display());
-        return Err(Failure::wrong(message, help));
+        let message = format!("{}: not a valid address of an object store", word.display());
+        let help = format!("write {address} for an object store, or ./{} for a folder", word.display());
+        return Err(ExitError::with_help(message, help));
     }
     if matches!(
         verb,
@@ -160,21 +200,39 @@ pub(crate) fn check_addresses(verb: &Verb, words: impl IntoIterator<Item = OsStr
     ) {
         return Ok(());
     }
-    match words.into_iter().find(|word| Home::is_address(Path::new(word))) {
+    match words.into_iter().find(|word| Location::is_address(Path::new(word))) {
         Some(word) => {
-            let message = format!("{}: a folder or file is wanted here", Path::new(&word).display());
+            let message = format!("{}: expected a folder or a file", Path::new(&word).display());
             let help = "generate, status, merge, verify and clean work on object stores";
-            Err(Failure::wrong(message, help))
+            Err(ExitError::with_help(message, help))
         }
         None => Ok(()),
     }
 }
 
-/// The address of an object store that was meant by one with too few strokes.
+/// The corrected address of an object store, if slashes are missing.
 fn mistyped(word: &str) -> Option<String> {
     let (scheme, rest) = word.split_once(":/")?;
     let is_store = matches!(scheme, "s3" | "gs" | "az") && !rest.starts_with('/');
     is_store.then(|| format!("{scheme}://{rest}"))
+}
+
+impl Verb {
+    /// Whether `--quiet` is given.
+    pub(crate) fn is_quiet(&self) -> bool {
+        match self {
+            Self::Generate(args) => args.quiet,
+            Self::Convert(args) => args.quiet,
+            Self::Rerender(args) => args.quiet,
+            Self::Sweep(args) => args.quiet,
+            #[cfg(feature = "judge")]
+            Self::Judge(args) => args.quiet,
+            #[cfg(feature = "judge")]
+            Self::Match(args) => args.quiet,
+            Self::Slide(args) => matches!(&args.verb, SlideVerb::Make(args) if args.quiet),
+            _ => false,
+        }
+    }
 }
 
 #[cfg(test)]
@@ -183,7 +241,7 @@ mod tests {
 
     #[cfg(all(feature = "calibrate", feature = "completions", feature = "judge", feature = "learn", feature = "web"))]
     #[test]
-    fn the_command_is_sound_and_every_verb_shows_an_example() {
+    fn the_command_is_valid_and_every_subcommand_shows_an_example() {
         let mut command = <Cli as clap::CommandFactory>::command();
         command.build();
         command.clone().debug_assert();
@@ -194,8 +252,8 @@ mod tests {
     }
 
     #[test]
-    fn frames_or_a_range_not_both_and_not_neither() {
-        let parse = |words: &str| Cli::try_parse_from(words.split(' '));
+    fn either_frames_or_a_range_is_required() {
+        let parse = |words: &str| super::parse(words.split(' ').map(OsString::from));
         assert!(parse("papsynth generate --out x").is_err());
         assert!(parse("papsynth generate --out x --frames 2 --range 0..2").is_err());
         assert!(parse("papsynth generate --out x --frames 0").is_err());
@@ -204,5 +262,22 @@ mod tests {
             unreachable!()
         };
         assert_eq!(generate.indices(), 3..5);
+    }
+
+    #[test]
+    fn negative_numbers_and_renamed_options_have_helpful_messages() {
+        let message = |words: &str| {
+            let error = super::parse(words.split(' ').map(OsString::from)).unwrap_err();
+            error.to_string()
+        };
+        let error = message("papsynth generate --out x --frames 1 --seed -1");
+        assert!(error.contains("expected an integer from 0 to 18446744073709551615"), "{error}");
+        for (words, new) in [
+            ("papsynth generate --out x --frames 1 --shard 0/2", "'--task'"),
+            ("papsynth slide make --out x --shard 0/2", "'--task'"),
+            ("papsynth clean x --strays", "'--untracked'"),
+        ] {
+            assert!(message(words).contains(new), "{}", message(words));
+        }
     }
 }

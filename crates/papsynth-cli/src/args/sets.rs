@@ -1,4 +1,4 @@
-//! What can be typed about data sets: their formats, their shares, what is done with them afterwards.
+//! Options of the subcommands for data sets.
 
 use std::path::PathBuf;
 
@@ -7,55 +7,57 @@ use papsynth::recipe::CameraPreset;
 use papsynth_dataset::{Check, Format};
 
 use super::shared::{EngineArgs, FileArgs, LayoutArgs};
-use super::values::{camera_parser, format_parser};
+use super::values::{camera_parser, format_parser, integer};
 
-/// How carefully files that are there are looked at, with `--verify` or without.
+/// The check of present files, with or without `--verify`.
 pub(crate) fn check_of(verify: bool) -> Check {
     if verify { Check::Hashes } else { Check::Sizes }
 }
 
-/// Read every file of a data set and say what is wrong.
+/// Check every file of a data set.
 ///
-/// Finds every bit that has changed, every file that is cut, missing or too many, every frame that is missing, and masks, boxes, areas, tables
-/// and label images that do not fit together; what `papsynth merge` writes is made again and compared. `papsynth generate --verify` with the same recipe mends what is found.
+/// Finds changed, truncated, missing and untracked files, missing frames, and masks, boxes, areas, tables and label
+/// images that contradict each other. Computes the merged files again and compares them. To repair frames, run
+/// `papsynth generate --verify` with the same recipe.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   papsynth verify fields
-  papsynth verify fields --frames 1000     every one of them must be there
+  papsynth verify fields --frames 1000     also check that all 1000 frames are present
   papsynth verify fields --json
 
-Exit codes: 0 whole; 2 something is wrong; 74 input/output.")]
+Exit codes: 0 no problems; 2 problems found; 74 input/output error.")]
 pub(crate) struct Verify {
     /// Folder or object store of the data set
     #[arg(value_name = "DIR")]
     pub(crate) dir: PathBuf,
-    /// Frames that must be there: those with index 0 to N − 1 [default: up to the last that is]
-    #[arg(long, value_name = "N")]
+    /// Number of frames that must be present [default: up to the last one present]
+    #[arg(long, value_name = "N", value_parser = integer(0, u64::MAX))]
     pub(crate) frames: Option<u64>,
-    /// As JSON
+    /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,
 }
 
-/// Remove what killed runs left behind in a data set.
+/// Remove temporary files of killed runs from a data set.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   papsynth clean fields
-  papsynth clean fields --strays     also everything else that is no file of the data set")]
+  papsynth clean fields --untracked     also remove files that do not belong to the data set")]
 pub(crate) struct Clean {
     /// Folder or object store of the data set
     #[arg(value_name = "DIR")]
     pub(crate) dir: PathBuf,
-    /// Remove every file that the data set does not name, whoever put it there; once it is merged, since before others may be writing
+    /// Also remove all files that do not belong to the data set; only after `papsynth merge`, because other tasks may
+    /// still write files before
     #[arg(long)]
-    pub(crate) strays: bool,
+    pub(crate) untracked: bool,
 }
 
 /// Write a data set in other formats.
 ///
-/// Nothing is rendered: images are copied level by level, truth mask by mask. Running the same command again goes on where it was stopped.
+/// Copies images and masks without rendering. Run the same command again to continue after an interruption.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -66,111 +68,112 @@ pub(crate) struct Convert {
     /// Folder of the data set
     #[arg(value_name = "DIR")]
     pub(crate) dir: PathBuf,
-    /// Folder of the new data set: new, empty, or one that this command began
+    /// Folder of the new data set: new, empty, or written by the same command
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
-    /// Formats to write, one or several
+    /// Formats to write, separated by commas
     #[arg(long, value_name = "NAME", value_parser = format_parser(), value_delimiter = ',', required = true)]
     pub(crate) format: Vec<Format>,
     #[command(flatten)]
     pub(crate) files: FileArgs,
-    /// Say nothing but errors
+    /// Print errors only
     #[arg(long, short)]
     pub(crate) quiet: bool,
 }
 
-/// Say how much of a data set is there, also while others write it.
+/// Print how much of a data set is present, also while tasks write it.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   papsynth status fields --frames 100000
-  papsynth status fields --frames 100000 --missing              numbers of the shards that are missing
+  papsynth status fields --frames 100000 --missing              print the missing shards
   sbatch --array=$(papsynth status fields --frames 100000 --missing --tasks 50) job.sh")]
 pub(crate) struct Status {
     /// Folder or object store of the data set, or folder of a slide
     #[arg(value_name = "DIR")]
     pub(crate) dir: PathBuf,
-    /// Frames that there will be: those with index 0 to N − 1; a slide, or a data set that was merged, knows it by itself
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    /// Number of frames of the complete data set; not needed for slides and merged data sets
+    #[arg(long, value_name = "N", value_parser = integer(1, u64::MAX))]
     pub(crate) frames: Option<u64>,
-    /// Print only what is missing, as numbers and ranges that `sbatch --array` takes; nothing if nothing is
+    /// Print only the missing shards, as numbers and ranges for `sbatch --array`
     #[arg(long)]
     pub(crate) missing: bool,
-    /// Count in tasks of an array of N (`--shard auto`, `--shard I/N`) instead of shards
-    #[arg(long, value_name = "N", requires = "missing", value_parser = clap::value_parser!(u64).range(1..))]
+    /// Print the tasks with missing shards instead, of N tasks in total (`--task I/N`)
+    #[arg(long, value_name = "N", requires = "missing", value_parser = integer(1, u64::MAX))]
     pub(crate) tasks: Option<u64>,
 }
 
-/// Close a data set that several runs have made: fail on any gap, write the files about all frames.
+/// Finish a data set of several tasks: check that all frames are present, and write the files about all frames.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  papsynth merge fields --frames 100000")]
 pub(crate) struct Merge {
     /// Folder or object store of the data set
     #[arg(value_name = "DIR")]
     pub(crate) dir: PathBuf,
-    /// Frames that must be there: those with index 0 to N − 1
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    /// Number of frames that must be present
+    #[arg(long, value_name = "N", value_parser = integer(1, u64::MAX))]
     pub(crate) frames: u64,
-    /// Read all files of shards before they are merged, not their sizes alone
+    /// Check the content of all files before the merge, not only their sizes
     #[arg(long)]
     pub(crate) verify: bool,
 }
 
-/// Say what a data set will cost, from a few frames made for it: time, bytes, memory, shards.
+/// Estimate time, disk space and memory of a data set from a few sample frames.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   papsynth plan --frames 100000
   papsynth plan my.toml --frames 1000000 --format webdataset --samples 16 --tasks 200
-  papsynth plan my.toml --frames 1000000 --per-core-hour 0.04     what it costs where a core costs that much an hour")]
+  papsynth plan my.toml --frames 1000000 --per-core-hour 0.04     estimate the price")]
 pub(crate) struct Plan {
     #[command(flatten)]
     pub(crate) engine: EngineArgs,
     #[command(flatten)]
     pub(crate) layout: LayoutArgs,
-    /// Frames that there will be
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    /// Number of frames of the data set
+    #[arg(long, value_name = "N", value_parser = integer(1, u64::MAX))]
     pub(crate) frames: u64,
-    /// Frames to make and throw away, on one thread
-    #[arg(long, value_name = "K", default_value_t = 6, value_parser = clap::value_parser!(u64).range(2..=1000))]
+    /// Number of sample frames, generated on one thread and deleted
+    #[arg(long, value_name = "K", default_value_t = 6, value_parser = integer(2, 1000_u64))]
     pub(crate) samples: u64,
-    /// Tasks of an array that share the work
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    /// Number of tasks that share the work
+    #[arg(long, value_name = "N", value_parser = integer(1, u64::MAX))]
     pub(crate) tasks: Option<u64>,
-    /// Price of a core for an hour, in any currency
+    /// Price of a core hour, in any currency
     #[arg(long, value_name = "PRICE")]
     pub(crate) per_core_hour: Option<f64>,
 }
 
-/// Print a script that makes a data set on a cluster; nothing is run.
+/// Print a script that generates a data set on a cluster.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   papsynth submit slurm --tasks 50 -- my.toml --out many --frames 100000 > job.sh
   papsynth submit kubernetes --tasks 50 --image registry.example/papsynth:0.1 -- --out /data/many --frames 100000 > job.yaml
 
-Tasks that fail by input/output (exit code 74) are run again, tasks that fail by usage, recipe or input (2) are not. When all have ended: papsynth status, then papsynth merge.")]
+Tasks that fail with an input/output error (exit code 74) are run again; tasks that fail with an error in
+usage, recipe or input (2) are not. When all tasks are done, run papsynth status, then papsynth merge.")]
 pub(crate) struct Submit {
-    /// What schedules the tasks
+    /// Scheduler of the cluster
     #[arg(value_name = "SCHEDULER", value_parser = ["slurm", "kubernetes"])]
     pub(crate) scheduler: String,
-    /// Tasks that share the work
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    /// Number of tasks that share the work
+    #[arg(long, value_name = "N", value_parser = integer(1, 100_000_u64))]
     pub(crate) tasks: u64,
-    /// Threads of each task
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    /// Number of threads of each task
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = integer(1, 1024_u16))]
     pub(crate) threads: u16,
-    /// Container image that holds the program, for Kubernetes
+    /// Container image with papsynth, for Kubernetes
     #[arg(long, value_name = "NAME", required_if_eq("scheduler", "kubernetes"))]
     pub(crate) image: Option<String>,
-    /// What follows `papsynth generate`, without --shard and --threads
+    /// Arguments of `papsynth generate`, without --task and --threads
     #[arg(last = true, required = true, value_name = "ARGUMENTS")]
     pub(crate) arguments: Vec<String>,
 }
 
-/// Image the scenes of a data set again under another microscope, camera, light, focus, stain or background.
+/// Image the scenes of a data set with another microscope, camera, light, focus, stain or background.
 ///
-/// Everything lies where it lay: the masks of both data sets are compared, and a difference is an error.
+/// The objects do not change: the masks of both data sets are compared, and a difference is an error.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -181,58 +184,58 @@ pub(crate) struct Rerender {
     /// Folder of the data set
     #[arg(value_name = "DIR")]
     pub(crate) dir: PathBuf,
-    /// Folder of the new data set: new, empty, or one that this command began
+    /// Folder of the new data set: new, empty, or written by the same command
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
-    /// Sections to put in the place of the recipe's; repeatable
+    /// File with sections that replace those of the recipe; repeatable
     #[arg(long, value_name = "FILE")]
     pub(crate) with: Vec<PathBuf>,
-    /// A built-in camera instead of the recipe's
+    /// Built-in camera that replaces the camera of the recipe
     #[arg(long, value_name = "NAME", value_parser = camera_parser())]
     pub(crate) camera: Option<CameraPreset>,
-    /// Set one field over the recipe; repeatable, the last one wins
+    /// Set one field of the recipe; repeatable, the last value counts
     #[arg(long, value_name = "FIELD=VALUE", allow_hyphen_values = true)]
     pub(crate) set: Vec<String>,
     #[command(flatten)]
     pub(crate) layout: LayoutArgs,
-    /// Threads to work with [default: one a core]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    /// Number of threads [default: the number of cores]
+    #[arg(long, value_name = "N", value_parser = integer(1, 1024_u16))]
     pub(crate) threads: Option<u16>,
-    /// Say nothing but errors
+    /// Print errors only
     #[arg(long, short)]
     pub(crate) quiet: bool,
 }
 
-/// Make the same fields under every combination of some settings, and one table of them all.
+/// Generate the same fields with every combination of settings, and a table of all images.
 ///
-/// Each combination becomes a data set in a folder of its own; what does not depend on what is varied stays the same. `sweep.csv` has a row for each
-/// image with the settings that made it: join it with what your method finds there.
+/// Each combination is a data set in its own folder. Objects and images change only where they depend on the settings.
+/// `sweep.csv` has a row per image with its settings, to join with the results of your method.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   papsynth sweep --out sweep --frames 8 --vary focus.centre_um=-4,-2,0,2,4
   papsynth sweep mine.toml --out sweep --frames 20 --vary debris.bacilli.clusters=0,8,32 --vary camera.full_well_e=2000,18000
-  papsynth sweep --out sweep --frames 4 --vary stain.slide_nucleus=0.5,1,2 --vary background.illumination.x2=0,0.1,0.3")]
+  papsynth sweep --out sweep --frames 4 --vary stain.slide_nucleus=0.5,1,2 --vary background.illumination.falloff_x=0,0.1,0.3")]
 pub(crate) struct Sweep {
     #[command(flatten)]
     pub(crate) engine: EngineArgs,
-    /// Folder of the sweep: new, empty, or one that this command began
+    /// Folder of the sweep: new, empty, or written by the same command
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     /// Number of frames of each combination
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = integer(1, u64::MAX))]
     pub(crate) frames: u64,
-    /// A field of the recipe and the values that it takes, separated by commas; repeatable, all are combined
+    /// Field of the recipe and its values; repeatable, all combinations are generated
     #[arg(long, value_name = "FIELD=A,B,…", required = true, allow_hyphen_values = true)]
     pub(crate) vary: Vec<String>,
     #[command(flatten)]
     pub(crate) layout: LayoutArgs,
-    /// Say nothing but errors
+    /// Print errors only
     #[arg(long, short)]
     pub(crate) quiet: bool,
 }
 
-/// Show what is in a data set.
+/// Print the contents of a data set.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -243,10 +246,10 @@ pub(crate) struct Inspect {
     /// Folder of the data set
     #[arg(value_name = "DIR")]
     pub(crate) dir: PathBuf,
-    /// Read every file and compare its SHA-256, instead of its size alone
+    /// Check the SHA-256 of every file, not only its size
     #[arg(long)]
     pub(crate) verify: bool,
-    /// As JSON instead of a table
+    /// Print JSON instead of a table
     #[arg(long)]
     pub(crate) json: bool,
 }

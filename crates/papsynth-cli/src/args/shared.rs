@@ -1,94 +1,105 @@
-//! What several commands share: recipe, model, seed and threads, and the files of a data set.
+//! Options of several subcommands: recipe, model, seed, threads, and the files of a data set.
 
 use std::path::PathBuf;
+use std::sync::Once;
 
 use clap::Args;
 use papsynth::recipe::{CameraPreset, Preset};
 use papsynth_dataset::{Flatten, Format, Layout};
 
-use super::values::{camera_parser, format_parser, named, preset_parser};
+use super::values::{camera_parser, format_parser, integer, named, preset_parser};
+use crate::exit;
+use crate::words::counted;
 
-/// What a recipe is made of.
+/// Options of the recipe.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct RecipeArgs {
-    /// Recipe in TOML, as `papsynth init` prints it; `-` reads standard input [default: the preset `lbc`]
+    /// Recipe in TOML, as printed by `papsynth init`; `-` reads standard input [default: the preset `lbc`]
     #[arg(value_name = "RECIPE")]
     pub(crate) recipe: Option<PathBuf>,
-    /// A built-in recipe instead of a file
+    /// Built-in recipe instead of a file
     #[arg(long, value_name = "NAME", value_parser = preset_parser(), conflicts_with = "recipe")]
     pub(crate) preset: Option<Preset>,
-    /// Sections to put in the place of the recipe's, such as `papsynth calibrate` measured; repeatable
+    /// File with sections that replace those of the recipe, such as the output of `papsynth calibrate`; repeatable
     #[arg(long, value_name = "FILE")]
     pub(crate) with: Vec<PathBuf>,
-    /// A built-in camera instead of the recipe's
+    /// Built-in camera that replaces the camera of the recipe
     #[arg(long, value_name = "NAME", value_parser = camera_parser())]
     pub(crate) camera: Option<CameraPreset>,
-    /// Set one field over the recipe; repeatable, the last one wins
+    /// Set one field of the recipe; repeatable, the last value counts
     #[arg(long, value_name = "FIELD=VALUE", allow_hyphen_values = true)]
     pub(crate) set: Vec<String>,
 }
 
-/// What an engine is made of.
+/// Options of the engine.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct EngineArgs {
     #[command(flatten)]
     pub(crate) recipe: RecipeArgs,
-    /// Model that `papsynth learn` wrote, or a class file (TOML), beside the classes that ship
+    /// Model of `papsynth learn`, or class file (TOML), in addition to the built-in classes
     #[arg(long, value_name = "FILE")]
     pub(crate) model: Option<PathBuf>,
-    /// Seed of the whole data set; recipes that differ share what they have in common under the same seed
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    /// Seed of the data set; with the same seed, recipes generate equal objects where they agree
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = integer(0, u64::MAX))]
     pub(crate) seed: u64,
-    /// Threads to work with; the bytes are the same with any number [default: one a core]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    /// Number of threads; does not change the output [default: the number of cores]
+    #[arg(long, value_name = "N", value_parser = integer(1, 1024_u16))]
     pub(crate) threads: Option<u16>,
 }
 
-/// As many threads as asked for, or one a core.
+/// The number of threads of `--threads`, or of cores. More than 8 threads are limited to the number of cores, because
+/// more only slow a run down.
 pub(crate) fn threads(asked: Option<u16>) -> usize {
-    match asked {
-        Some(threads) => usize::from(threads),
-        None => std::thread::available_parallelism().map_or(1, usize::from),
+    const ALWAYS_ALLOWED: usize = 8;
+    static NOTE: Once = Once::new();
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let Some(asked) = asked.map(usize::from) else { return cores };
+    let limit = cores.max(ALWAYS_ALLOWED);
+    if asked > limit {
+        let cores = counted(cores as u64, "core", "cores");
+        NOTE.call_once(|| exit::note(format!("--threads {asked}: {limit} are used, as this machine has {cores}")));
     }
+    asked.min(limit)
 }
 
-/// How a data set lies in files.
+/// Formats and files of a data set.
 #[derive(Debug, Args)]
 pub(crate) struct LayoutArgs {
-    /// Formats to write, one or several [default: folder; webdataset above 10000 frames]
+    /// Formats to write, separated by commas [default: folder; webdataset above 10000 frames]
     #[arg(long, value_name = "NAME", value_parser = format_parser(), value_delimiter = ',')]
     pub(crate) format: Vec<Format>,
     #[command(flatten)]
     pub(crate) files: FileArgs,
-    /// Write the scene of each frame too, as scenes/NNNNNN.json, which `papsynth render` reads
+    /// Also write the scene of each frame to scenes/NNNNNN.json, for `papsynth render`
     #[arg(long)]
     pub(crate) scenes: bool,
 }
 
-/// The same, whatever the formats.
+/// Files of a data set, for all formats.
 #[derive(Debug, Args)]
 pub(crate) struct FileArgs {
-    /// What a pixel shows that belongs to several objects, in formats with one label a pixel
+    /// Label of a pixel with several objects, in formats with one label per pixel
     #[arg(long, value_name = "POLICY", value_parser = named(Flatten::ALL, Flatten::name), default_value = Flatten::Top.name())]
     pub(crate) flatten: Flatten,
-    /// Frames that are written and made again together [default: 1; 256 with webdataset and huggingface]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    /// Frames per shard, the group of frames that is written or repaired together [default: 1; 256 with webdataset and
+    /// huggingface]
+    #[arg(long, value_name = "N", value_parser = integer(1, 1_000_000_u64))]
     pub(crate) frames_per_shard: Option<u64>,
-    /// Write the table of objects as CSV alone, not as Parquet too
+    /// Write the table of objects as CSV only, without Parquet
     #[cfg(feature = "parquet")]
     #[arg(long)]
     pub(crate) no_parquet: bool,
 }
 
 impl LayoutArgs {
-    /// From this many frames on a folder of single files is a burden.
-    pub(crate) const MOST_IN_FOLDERS: u64 = 10_000;
+    /// Largest number of frames for which `folder` is the default format.
+    pub(crate) const MAX_IN_FOLDERS: u64 = 10_000;
 
-    /// The layout of a data set of so many frames, and whether its format was chosen for their number.
+    /// The layout of a data set with this many frames, and whether the number of frames decides its format.
     pub(crate) fn layout(&self, frames: u64) -> (Layout, bool) {
-        let many = self.format.is_empty() && frames > Self::MOST_IN_FOLDERS;
-        let usual = if many { Format::Webdataset } else { Format::Folder };
-        let formats = if self.format.is_empty() { vec![usual] } else { self.format.clone() };
+        let many = self.format.is_empty() && frames > Self::MAX_IN_FOLDERS;
+        let default = if many { Format::Webdataset } else { Format::Folder };
+        let formats = if self.format.is_empty() { vec![default] } else { self.format.clone() };
         (Layout { scenes: self.scenes, ..self.files.layout(formats) }, many)
     }
 }

@@ -1,42 +1,43 @@
-//! What can be typed about whole slides.
+//! Options of the subcommands for slides.
 
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
 use super::shared::EngineArgs;
-use super::values::parse_pair;
+use super::values::{integer, parse_pair};
 use crate::memory::parse_size;
-use crate::share::ShareArgs;
+use crate::task::TaskArgs;
 
-/// Whole slides, larger than memory, and any part of one.
+/// Generate slides, which may be larger than memory, and regions of slides.
 ///
-/// `[scan]` of a recipe says how large a slide is and where its deposit lies; counts of cells and debris are those of a field where the
-/// deposit is full.
+/// `[scan]` of a recipe sets the size of a slide and the position of its deposit. Counts of cells and debris hold for a
+/// field in the full deposit.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   papsynth slide make --out slide --size 8192,8192 --set scan.deposit.x_um=1000 --set scan.deposit.y_um=1000
-  papsynth slide tile --at 30000,28000 --size 1024,768 --out tile.png    any part, without the rest
-  papsynth slide make --out big --shard 0/16                             one of sixteen shares; then
+  papsynth slide tile --at 30000,28000 --size 1024,768 --out tile.png    one region only
+  papsynth slide make --out big --task 0/16                              task 0 of 16; after all tasks:
   papsynth slide finalize big
   papsynth verify big
 
-A slide is an OME-Zarr 0.5 image with labels, and a table and a GeoJSON file of objects for every square of it.")]
+A slide is an OME-Zarr 0.5 image with labels, and a table and a GeoJSON file of objects per shard.")]
 pub(crate) struct Slide {
-    /// What to do.
+    /// The subcommand.
     #[command(subcommand)]
     pub(crate) verb: SlideVerb,
 }
 
-/// What is done with slides.
+/// The subcommands for slides.
 #[derive(Debug, Subcommand)]
 pub(crate) enum SlideVerb {
-    /// Make a slide, or a share of it; what is whole is left alone.
+    /// Generate a slide, or one task of it. Complete shards are not written again.
     Make(SlideMake),
-    /// Close a slide whose shards were made by several: the upper levels, a thumbnail, a card. Fails on any gap.
+    /// Finish a slide of several tasks: check that all shards are present, and write lower resolutions, thumbnail and
+    /// card.
     Finalize(SlideFinalize),
-    /// Make any part of a slide alone, as a PNG; of several planes the middle one.
+    /// Write a region of a slide as a PNG; of several planes the centre one.
     Tile(SlideTile),
 }
 
@@ -44,37 +45,37 @@ pub(crate) enum SlideVerb {
 #[command(after_help = "\
 Examples:
   papsynth slide make --out slide --size 8192,8192 --set scan.deposit.x_um=1000 --set scan.deposit.y_um=1000
-  papsynth slide make mine.toml --out big --shard 0/16         one of sixteen shares
-  papsynth slide make mine.toml --out big --verify             reads what is there, and makes again what is wrong")]
+  papsynth slide make mine.toml --out big --task 0/16          task 0 of 16
+  papsynth slide make mine.toml --out big --verify             check present files and repair invalid ones")]
 pub(crate) struct SlideMake {
     #[command(flatten)]
     pub(crate) engine: EngineArgs,
-    /// Folder of the slide: new, empty, or one that this command began
+    /// Folder of the slide: new, empty, or written by the same command
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
-    /// Number of the slide among those of the seed
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..1 << 30))]
+    /// Index of the slide
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = integer(0, (1_u64 << 30) - 1))]
     pub(crate) slide: u64,
-    /// Columns and rows, px [default: scan.width_px and scan.height_px of the recipe]
+    /// Width and height, px [default: scan.width_px and scan.height_px of the recipe]
     #[arg(long, value_name = "W,H", value_parser = parse_pair)]
     pub(crate) size: Option<[u32; 2]>,
-    /// Side of the squares that are written and made again together, px
+    /// Side of a shard, the square that is written or repaired together, px
     #[arg(long, value_name = "PX", default_value = "4096", value_parser = ["512", "1024", "2048", "4096", "8192"])]
     pub(crate) shard_px: String,
-    /// Write tables of objects as CSV alone, not as Parquet too
+    /// Write tables of objects as CSV only, without Parquet
     #[cfg(feature = "parquet")]
     #[arg(long)]
     pub(crate) no_parquet: bool,
     #[command(flatten)]
-    pub(crate) share: ShareArgs,
-    /// Memory to use at most, such as 2GiB: fewer frames are made side by side if need be [default: 80 % of what is available, where the
-    /// system tells]
+    pub(crate) task: TaskArgs,
+    /// Memory limit, for example 2GiB; fewer threads are used if needed [default: 80 % of the available memory, on
+    /// Linux]
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     pub(crate) max_memory: Option<u64>,
-    /// Read all files of shards that are there before they are kept
+    /// Check the content of files that are already present, not only their sizes, and repair invalid files
     #[arg(long)]
     pub(crate) verify: bool,
-    /// Say nothing but errors
+    /// Print errors only
     #[arg(long, short)]
     pub(crate) quiet: bool,
 }
@@ -85,7 +86,7 @@ pub(crate) struct SlideFinalize {
     /// Folder of the slide
     #[arg(value_name = "DIR")]
     pub(crate) dir: PathBuf,
-    /// Read all files of shards before, not their sizes alone
+    /// Check the content of all files first, not only their sizes
     #[arg(long)]
     pub(crate) verify: bool,
 }
@@ -95,16 +96,19 @@ pub(crate) struct SlideFinalize {
 pub(crate) struct SlideTile {
     #[command(flatten)]
     pub(crate) engine: EngineArgs,
-    /// PNG to write: of a slide of several planes the middle one
+    /// PNG to write; replaces an older image of papsynth, but no other file
     #[arg(long, value_name = "FILE")]
     pub(crate) out: PathBuf,
-    /// Number of the slide among those of the seed
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..1 << 30))]
+    /// Replace any existing file
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Index of the slide
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = integer(0, (1_u64 << 30) - 1))]
     pub(crate) slide: u64,
-    /// Column and row of the first pixel
+    /// Column and row of the top left pixel
     #[arg(long, value_name = "X,Y", value_parser = parse_pair)]
     pub(crate) at: [u32; 2],
-    /// Columns and rows, px
+    /// Width and height, px
     #[arg(long, value_name = "W,H", value_parser = parse_pair, default_value = "1024,1024")]
     pub(crate) size: [u32; 2],
 }

@@ -1,12 +1,14 @@
-//! How values are typed: names, ranges, sizes.
+//! Parsers of option values: names, numbers, ranges, sizes.
 
+use std::fmt::Display;
 use std::ops::Range;
+use std::str::FromStr;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use papsynth::recipe::{CameraPreset, Preset};
 use papsynth_dataset::Format;
 
-/// One of a few values by its name.
+/// Parses one of a few values by its name.
 pub(super) fn named<T: Copy + Send + Sync + 'static, const N: usize>(
     all: [T; N],
     name: fn(T) -> &'static str,
@@ -14,30 +16,31 @@ pub(super) fn named<T: Copy + Send + Sync + 'static, const N: usize>(
     explained(all, name, move |value| PossibleValue::new(name(value)))
 }
 
-/// The same, each with what it is.
+/// The same, with a description of each value.
 fn explained<T: Copy + Send + Sync + 'static, const N: usize>(
     all: [T; N],
     name: fn(T) -> &'static str,
     explained: impl Fn(T) -> PossibleValue,
 ) -> impl TypedValueParser<Value = T> {
     PossibleValuesParser::new(all.map(explained)).try_map(move |typed| {
-        all.into_iter().find(|value| name(*value) == typed).ok_or_else(|| format!("there is no `{typed}`"))
+        all.into_iter().find(|value| name(*value) == typed).ok_or_else(|| format!("unknown value `{typed}`"))
     })
 }
 
-/// Names of presets, each with what it shows.
+/// Parses names of presets.
 pub(super) fn preset_parser() -> impl TypedValueParser<Value = Preset> {
     explained(Preset::ALL, Preset::name, |preset| PossibleValue::new(preset.name()).help(preset.summary()))
 }
 
+/// Parses names of cameras.
 pub(super) fn camera_parser() -> impl TypedValueParser<Value = CameraPreset> {
     explained(CameraPreset::ALL, CameraPreset::name, |camera| PossibleValue::new(camera.name()).help(camera.summary()))
 }
 
-/// Names of formats, each with what it is.
+/// Parses names of formats.
 pub(super) fn format_parser() -> impl TypedValueParser<Value = Format> {
     let about = |format: Format| {
-        let needs = format.needs().map(|feature| format!(" (wants a build with --features {feature})"));
+        let needs = format.needs().map(|feature| format!(" (needs a build with --features {feature})"));
         PossibleValue::new(format.name()).help(format!("{}{}", format.about(), needs.unwrap_or_default()))
     };
     explained(Format::ALL, Format::name, about).try_map(|format| match format.needs() {
@@ -48,28 +51,38 @@ pub(super) fn format_parser() -> impl TypedValueParser<Value = Format> {
     })
 }
 
-pub(super) fn parse_range(text: &str) -> Result<Range<u64>, String> {
-    let expected = "expected A..B with whole numbers A < B, such as 0..100";
-    let (from, to) = text.split_once("..").ok_or(expected)?;
-    let number = |part: &str| part.trim().parse::<u64>().map_err(|e| format!("{part:?}: {e}; {expected}"));
-    let range = number(from)?..number(to)?;
-    if range.is_empty() {
-        return Err(format!("no frame lies in it; {expected}"));
+/// Parses integers of a range, both ends included.
+pub(super) fn integer<T>(low: T, high: T) -> impl Fn(&str) -> Result<T, String> + Clone
+where
+    T: Copy + Display + FromStr + PartialOrd,
+{
+    move |text| match text.parse() {
+        Ok(value) if low <= value && value <= high => Ok(value),
+        _ => Err(format!("expected an integer from {low} to {high}")),
     }
-    Ok(range)
 }
 
-/// Two whole numbers.
+/// Parses `A..B`, B excluded.
+pub(super) fn parse_range(text: &str) -> Result<Range<u64>, String> {
+    let expected = || "expected A..B with integers A < B, for example 0..100".to_owned();
+    let (from, to) = text.split_once("..").ok_or_else(expected)?;
+    let number = |part: &str| part.trim().parse::<u64>().map_err(|_| expected());
+    let range = number(from)?..number(to)?;
+    if range.is_empty() { Err(expected()) } else { Ok(range) }
+}
+
+/// Parses two integers.
 pub(super) fn parse_pair(text: &str) -> Result<[u32; 2], String> {
-    let expected = "expected two whole numbers, such as 1024,768";
-    let (first, second) = text.split_once([',', 'x']).ok_or(expected)?;
-    let number = |part: &str| part.trim().parse::<u32>().map_err(|e| format!("{part:?}: {e}; {expected}"));
+    let expected = || "expected two integers, for example 1024,768".to_owned();
+    let (first, second) = text.split_once([',', 'x']).ok_or_else(expected)?;
+    let number = |part: &str| part.trim().parse::<u32>().map_err(|_| expected());
     Ok([number(first)?, number(second)?])
 }
 
+/// Parses a pixel size, µm.
 #[cfg(any(feature = "calibrate", feature = "judge", feature = "learn", feature = "web"))]
 pub(super) fn parse_pixel(text: &str) -> Result<f64, String> {
-    /// What a recipe's `field.pixel_um` may be as well.
+    /// The range of `field.pixel_um` of a recipe.
     const ALLOWED: std::ops::RangeInclusive<f64> = 0.05..=4.0;
     match text.parse() {
         Ok(value) if ALLOWED.contains(&value) => Ok(value),
@@ -82,7 +95,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ranges_are_read() {
+    fn integers_outside_the_range_name_the_range() {
+        let parse = integer(1, 1024_u16);
+        assert_eq!(parse("1024"), Ok(1024));
+        for bad in ["0", "1025", "-1", "1.5", "", "x"] {
+            assert_eq!(parse(bad), Err("expected an integer from 1 to 1024".to_owned()), "{bad}");
+        }
+    }
+
+    #[test]
+    fn ranges_are_parsed() {
         assert_eq!(parse_range("3..7"), Ok(3..7));
         for bad in ["3", "7..3", "3..3", "a..b", "-1..3", "1..", "..4", "0..99999999999999999999999"] {
             assert!(parse_range(bad).unwrap_err().contains("A..B"), "{bad}");

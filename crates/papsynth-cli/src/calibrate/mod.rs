@@ -1,4 +1,4 @@
-//! `papsynth calibrate`: a user's own images in, numbers of their microscope and camera out.
+//! `papsynth calibrate`: parameters of a microscope and a camera, measured on images.
 
 mod images;
 mod plot;
@@ -8,28 +8,30 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
-use papsynth_calibrate::{Calibration, Error, Instrument, RECIPE_BEGINS};
+use papsynth_calibrate::{Calibration, Error, Instrument, RECIPE_PREFIX};
 use papsynth_dataset::write_file;
 
 use crate::args::Calibrate;
-use crate::exit::{self, Failure};
-use crate::text_file::may_replace_in;
+use crate::exit::{self, ExitError};
+use crate::output_file::{Kind, check_folder};
 
 const RECORD: &str = "calibration.json";
 
-/// Files that may be written, and how those begin that may be replaced.
-const FILES: [(&str, &[u8], &str); 7] = [
-    ("focus.svg", plot::BEGINS, "an older plot"),
-    ("edge.svg", plot::BEGINS, "an older plot"),
-    ("photon-transfer.svg", plot::BEGINS, "an older plot"),
-    ("optics.toml", RECIPE_BEGINS, "an older calibration"),
-    ("optics-gaussian.toml", RECIPE_BEGINS, "an older calibration"),
-    ("camera.toml", RECIPE_BEGINS, "an older calibration"),
-    (RECORD, Calibration::BEGINS, "an older calibration"),
+/// Output files, and the beginnings by which older ones are recognized.
+const PLOT: Kind = Kind::Text(plot::BEGINS, "a plot of papsynth calibrate");
+const RECIPE: Kind = Kind::Text(RECIPE_BEGINS, "a recipe of papsynth calibrate");
+const FILES: [(&str, Kind); 7] = [
+    ("focus.svg", PLOT),
+    ("edge.svg", PLOT),
+    ("photon-transfer.svg", PLOT),
+    ("optics.toml", RECIPE),
+    ("optics-gaussian.toml", RECIPE),
+    ("camera.toml", RECIPE),
+    (RECORD, Kind::Text(Calibration::BEGINS, "a calibration of papsynth")),
 ];
 
-pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
-    may_replace_in(&args.out, &FILES)?;
+pub(crate) fn run(args: &Calibrate) -> Result<(), ExitError> {
+    check_folder(&args.out, &FILES)?;
     let instrument = instrument(args)?;
     let older = older(&args.out.join(RECORD))?;
     if let Some(older) = &older {
@@ -57,10 +59,10 @@ pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
         found.camera = Some(camera);
     }
     if let Some(older) = older {
-        found.keep(older);
+        found.merge_older(older);
     }
     let optics = found.bright_field_toml();
-    let optics = optics.map_err(|error| Failure::input(format!("--edge: {error}")))?;
+    let optics = optics.map_err(|error| ExitError::input(format!("--edge: {error}")))?;
     files.extend(optics.map(|text| ("optics.toml", text)));
     files.extend(found.gaussian_toml().map(|text| ("optics-gaussian.toml", text)));
     files.extend(found.camera_toml().map(|text| ("camera.toml", text)));
@@ -72,8 +74,8 @@ pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
     exit::print(&report.join("\n"))
 }
 
-/// What is known of the microscope; nothing where the size of a pixel is not.
-fn instrument(args: &Calibrate) -> Result<Option<Instrument>, Failure> {
+/// The microscope of the options; `None` without `--pixel-um`.
+fn instrument(args: &Calibrate) -> Result<Option<Instrument>, ExitError> {
     let instrument = Instrument {
         na: args.na,
         wavelength_um: args.wavelength_um,
@@ -85,34 +87,34 @@ fn instrument(args: &Calibrate) -> Result<Option<Instrument>, Failure> {
         Ok(()) => Ok(args.pixel_um.map(|_| instrument)),
         Err(Error::Microscope(optics_psf::Error::OutOfRange { field, value, accepted })) => {
             let accepted = accepted.replace('_', "-");
-            let message = format!("--{} is {value}; it must be {accepted}", field.replace('_', "-"));
-            Err(Failure::input(message))
+            let message = format!("--{} {value}: expected {accepted}", field.replace('_', "-"));
+            Err(ExitError::input(message))
         }
-        Err(other) => Err(Failure::input(other)),
+        Err(other) => Err(ExitError::input(other)),
     }
 }
 
-/// The calibration of a folder, if there is one.
-fn older(path: &Path) -> Result<Option<Calibration>, Failure> {
+/// Reads the calibration of a folder, if there is one.
+fn older(path: &Path) -> Result<Option<Calibration>, ExitError> {
     let text = match fs::read_to_string(path) {
         Ok(text) => text,
         Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => return Ok(None),
-        Err(error) => return Err(Failure::file("read", path, &error)),
+        Err(error) => return Err(ExitError::file("read", path, &error)),
     };
-    let refuse = |what: String| {
+    let error = |what: String| {
         let help = "choose another folder with --out, or remove the file";
-        Err(Failure::wrong(format!("{}: {what}", path.display()), help))
+        Err(ExitError::with_help(format!("{}: {what}", path.display()), help))
     };
     const KNOWN: u32 = Calibration::VERSION;
     match serde_json::from_str::<Calibration>(&text) {
         Ok(found) if found.calibration == KNOWN => Ok(Some(found)),
-        Ok(found) => refuse(format!("a calibration of version {}; this program knows {KNOWN}", found.calibration)),
-        Err(error) => refuse(format!("it is no calibration of this program: {error}")),
+        Ok(found) => error(format!("version {}; expected version {KNOWN}", found.calibration)),
+        Err(invalid) => error(format!("not a calibration of papsynth: {invalid}")),
     }
 }
 
-/// One folder is of one microscope: what it holds from before must fit.
-fn same_microscope(instrument: Option<&Instrument>, older: &Calibration, out: &Path) -> Result<(), Failure> {
+/// Checks that an older calibration in the folder is of the same microscope.
+fn same_microscope(instrument: Option<&Instrument>, older: &Calibration, out: &Path) -> Result<(), ExitError> {
     let (Some(new), Some(old)) = (instrument, &older.microscope) else { return Ok(()) };
     let pairs = [
         ("--na", new.na, old.na),
@@ -124,15 +126,17 @@ fn same_microscope(instrument: Option<&Instrument>, older: &Calibration, out: &P
     match pairs.into_iter().find(|(_, new, old)| new != old) {
         None => Ok(()),
         Some((option, new, old)) => {
-            let message =
-                format!("{}: was measured with {option} {old}; this command has {new}", out.join(RECORD).display());
-            let help = format!("give {option} {old}, or another folder with --out");
-            Err(Failure::wrong(message, help))
+            let message = format!(
+                "{}: measured with {option} {old}; this command has {option} {new}",
+                out.join(RECORD).display()
+            );
+            let help = format!("give {option} {old}, or choose another folder with --out");
+            Err(ExitError::with_help(message, help))
         }
     }
 }
 
-/// What was written, and what could not be for want of a length.
+/// The list of written files, and the options that are missing for complete recipes.
 fn written(args: &Calibrate, files: &[(&str, String)]) -> String {
     let out = args.out.display();
     let names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
@@ -149,7 +153,7 @@ fn written(args: &Calibrate, files: &[(&str, String)]) -> String {
     .collect();
     if !missing.is_empty() {
         text.push_str(&format!(
-            "Not in micrometres, so not all could go into a recipe: give {}\n",
+            "Lengths are in pixels or planes, so some are missing in the recipes: give {}\n",
             missing.join(" and ")
         ));
     }

@@ -1,4 +1,4 @@
-//! Measurements as drawings: SVG with plain text.
+//! Plots of measurements as SVG.
 
 use papsynth_calibrate::{Camera, Edge, Focus, Level};
 use papsynth_judge::svg::{COLOURS, Plot};
@@ -7,11 +7,11 @@ pub(super) const BEGINS: &[u8] = b"<svg ";
 
 const SIZE: [f64; 2] = [720.0, 480.0];
 
-/// Colours of what was measured, and of the fit.
+/// Colours of the measurements and of the fit.
 const POINTS: &str = COLOURS[0];
 const FIT: &str = COLOURS[1];
 
-/// σ against focus offset: quartiles and medians of all nuclei, and the line on each side.
+/// σ against focus offset: quartiles and medians of all nuclei, and the fitted line on each side.
 pub(super) fn focus(record: &Focus, pixel_um: Option<f64>) -> String {
     let (scale, unit) = record.step_um.map_or((1.0, "planes"), |step| (step, "µm of travel"));
     let largest = record.offsets.iter().map(|o| o.quartiles_px[1]).fold(1.0, f64::max);
@@ -20,7 +20,7 @@ pub(super) fn focus(record: &Focus, pixel_um: Option<f64>) -> String {
     let per = |slope: f64| match (record.step_um, pixel_um) {
         (Some(step), Some(pixel)) => format!("{:.3} µm per µm", slope * pixel / step),
         (Some(step), None) => format!("{:.3} px per µm", slope / step),
-        (None, _) => format!("{slope:.3} px a plane"),
+        (None, _) => format!("{slope:.3} px per plane"),
     };
     let [before, after] = [&record.before, &record.after].map(|side| per(side.slope_px));
     let nuclei = record.nuclei.len();
@@ -31,7 +31,7 @@ pub(super) fn focus(record: &Focus, pixel_um: Option<f64>) -> String {
     for o in &record.offsets {
         let x = o.planes as f64 * scale;
         plot.line(o.quartiles_px.iter().map(|sigma| [x, *sigma]), POINTS);
-        // What the lines do not go by is hollow.
+        // Points outside the fit are hollow.
         let point = [[x, o.sigma_px]].into_iter();
         if o.fitted || o.planes == 0 { plot.dots(point, POINTS) } else { plot.rings(point, POINTS) }
     }
@@ -43,7 +43,7 @@ pub(super) fn focus(record: &Focus, pixel_um: Option<f64>) -> String {
     plot.document()
 }
 
-/// Every pixel around an edge, and the fit.
+/// The pixels around an edge, and the fit.
 pub(super) fn edge(record: &Edge, profile: &[[f64; 2]], pixel_um: Option<f64>) -> String {
     /// Points of the fit on each side.
     const FINE: i32 = 200;
@@ -62,20 +62,20 @@ pub(super) fn edge(record: &Edge, profile: &[[f64; 2]], pixel_um: Option<f64>) -
     plot.document()
 }
 
-/// Variance against mean, both above the dark's, and the gain as the slope between them.
+/// Variance against mean, both above the dark level, and the line with the gain as slope.
 pub(super) fn photon_transfer(record: &Camera) -> String {
     let dark = record.levels.iter().find(|level| level.dark);
     let [dark_mean, dark_variance] = dark.map_or([0.0; 2], |level| [level.mean_dn, level.variance_dn2]);
     let above = |level: &Level| [level.mean_dn - dark_mean, level.variance_dn2 - dark_variance];
     let [right, top] = record.levels.iter().map(above).fold([0.0_f64; 2], |[x, y], p| [x.max(p[0]), y.max(p[1])]);
     let (gain, noise, prnu) = (record.gain_dn_per_e, record.dark_noise_e, 100.0 * record.prnu);
-    let title = format!("Photon transfer: {gain:.4} dn per electron, dark noise {noise:.2} e, PRNU {prnu:.2} %");
-    let (x_name, y_name) = ("mean above the dark, grey levels", "variance above the dark's, squared grey levels");
+    let title = format!("Photon transfer: {gain:.4} DN per electron, dark noise {noise:.2} e, PRNU {prnu:.2} %");
+    let (x_name, y_name) = ("mean above dark, DN", "variance above dark, DN²");
     let mut plot = Plot::sized(SIZE, &title, x_name, y_name, [0.0, 1.05 * right], [0.0, 1.1 * top]);
-    // As far as the drawing goes.
+    // The line ends at the border of the plot.
     let last = right.min(1.1 * top / record.gain_dn_per_e);
     plot.line([0.0, last].into_iter().map(|mean| [mean, mean * record.gain_dn_per_e]), FIT);
-    // What has pixels at the highest level is hollow.
+    // Levels with saturated pixels are hollow.
     let (hollow, full): (Vec<&Level>, Vec<&Level>) = record.levels.iter().partition(|level| level.at_highest > 0.0);
     plot.dots(full.into_iter().map(above), POINTS);
     plot.rings(hollow.into_iter().map(above), POINTS);

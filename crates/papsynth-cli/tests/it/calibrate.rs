@@ -1,8 +1,8 @@
-//! `papsynth calibrate` from outside: images of known blur and noise in, the same numbers out.
+//! `papsynth calibrate` on images with known blur and noise.
 
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the numbers are small")]
 
-#[allow(dead_code, reason = "each test uses its part")]
+#[allow(dead_code, reason = "each test uses a part")]
 use crate::support;
 use std::fs;
 use std::path::PathBuf;
@@ -22,7 +22,7 @@ fn uniform(rng: &mut Xoshiro256PlusPlus, low: f64, high: f64) -> f64 {
     low + (high - low) * f64::from(rng.next_u32()) / 4_294_967_296.0
 }
 
-/// A row-major image of what `at` gives for x and y.
+/// A row-major image of the values of `at`.
 fn image(side: usize, at: impl Fn(f64, f64) -> f64) -> Vec<f32> {
     (0..side * side).map(|i| at((i % side) as f64, (i / side) as f64) as f32).collect()
 }
@@ -45,7 +45,7 @@ pub(crate) fn nucleus(seed: u64) -> impl Fn(f64, f64) -> f64 {
     }
 }
 
-/// Planes of an object as a microscope shows it that moves its stage; `object` is given in µm from the middle.
+/// A focus stack of an object. `object` takes µm from the centre.
 pub(crate) fn bright_field(condenser_na: f64, stages_um: &[f64], object: impl Fn(f64, f64) -> f64) -> Vec<Vec<f32>> {
     let microscope = Microscope::new(&MicroscopeParams { condenser_na, ..MicroscopeParams::default() }).unwrap();
     let samples = 2 * SIDE;
@@ -83,7 +83,7 @@ fn write_grey16(path: PathBuf, grey: &[u16], width: usize) {
     encoder.write_image::<colortype::Gray16>(width as u32, (grey.len() / width) as u32, grey).unwrap();
 }
 
-/// Three nuclei, each in focus in a plane of its own, with a Gaussian of 0.6 px for each plane from there.
+/// Three nuclei in focus in different planes, with a Gaussian blur of 0.6 px per plane of defocus.
 fn three_nuclei(planes: usize) -> Vec<Vec<f32>> {
     let nuclei = [(40.0, 44.0, 8), (150.0, 60.0, 9), (90.0, 150.0, 10)];
     let focused: Vec<(Vec<f32>, usize)> = nuclei
@@ -119,12 +119,12 @@ fn json(bench: &Bench, name: &str) -> serde_json::Value {
     serde_json::from_str(&fs::read_to_string(bench.path(name)).unwrap()).unwrap()
 }
 
-/// A run that must be refused with code 2, name what is wrong, and write nothing.
-fn refused(bench: &Bench, words: &str, named: &[&str]) {
+/// Checks that a run has exit code 2, prints these words, and writes no file.
+fn rejected(bench: &Bench, words: &str, named: &[&str]) {
     let Outcome { code, err, out } = bench.run(&format!("calibrate {words}"));
     assert_eq!(code, 2, "{words}\n{out}{err}");
     for named in named {
-        assert!(err.contains(named), "{words}: wanted {named:?} in\n{err}");
+        assert!(err.contains(named), "{words}: expected {named:?} in\n{err}");
     }
     assert!(!bench.path("calibration").exists(), "{words}");
 }
@@ -144,7 +144,7 @@ fn a_stack_in_micrometres_gives_fig_10_and_the_condenser() {
     for (key, value) in known.into_iter().chain([("extra_blur_um", 0.0), ("stray_light", 0.0)]) {
         assert_eq!(number(&optics, key), value, "{key}");
     }
-    // The default aperture is the one that gives the paper's 0.25 µm for each µm.
+    // The default aperture gives the 0.25 µm per µm of the paper.
     let gaussian = toml(&bench, "calibration/optics-gaussian.toml", "optics");
     assert_eq!(gaussian["kind"].as_str(), Some("gaussian"));
     assert!((number(&gaussian, "sigma_z_um_per_um") - 0.25).abs() < 0.02, "{gaussian}");
@@ -158,7 +158,7 @@ fn a_stack_in_micrometres_gives_fig_10_and_the_condenser() {
     assert!(svg.starts_with("<svg ") && svg.trim_end().ends_with("</svg>") && svg.contains("<text"), "{svg}");
     assert!(svg.contains("µm per µm"));
 
-    // Opened wider, blur grows; the same command replaces what it wrote.
+    // A larger aperture has more blur; the same command replaces its output.
     write_pages(bench.path("stack.tif"), &bright_field(0.6, &stages, nucleus(3)), SIDE);
     bench.good("calibrate --stack stack.tif --step-um 0.8 --pixel-um 0.25 --window 44,44,40,40");
     let optics = toml(&bench, "calibration/optics.toml", "optics");
@@ -166,11 +166,11 @@ fn a_stack_in_micrometres_gives_fig_10_and_the_condenser() {
 }
 
 #[test]
-fn a_folder_of_planes_gives_the_law_in_planes() {
+fn a_folder_of_planes_gives_the_blur_per_plane() {
     let bench = Bench::new("calibrate-planes");
     fs::create_dir(bench.path("planes")).unwrap();
     for (k, plane) in three_nuclei(19).iter().enumerate() {
-        // Names whose letters alone would put plane 10 before plane 2.
+        // Alphabetical order would put plane 10 before plane 2.
         bench.grey_png(&format!("planes/z{k}.png"), 192, 192, |x, y| plane[(y * 192 + x) as usize].round() as u8);
     }
     let run = bench.good("calibrate --stack planes --out here");
@@ -188,10 +188,10 @@ fn a_folder_of_planes_gives_the_law_in_planes() {
         assert!((side["proportional_px"].as_f64().unwrap() - 0.6).abs() < 0.015, "{side}");
         assert!(side["r_squared"].as_f64().unwrap() > 0.999, "{side}");
     }
-    // The files of a folder, named one by one, and a length alone.
+    // The files one by one, and only one of the lengths.
     let files: String = (0..19).rev().map(|k| format!(" planes/z{k}.png")).collect();
     let again = bench.good(&format!("calibrate --out there --step-um 0.5 --stack{files}"));
-    assert!(again.out.contains("1.2") && again.out.contains("px for each um of travel"), "{}", again.out);
+    assert!(again.out.contains("1.2") && again.out.contains("px per um of travel"), "{}", again.out);
     assert!(again.out.contains("give --pixel-um\n"), "{}", again.out);
     assert_eq!(json(&bench, "there/calibration.json")["focus"]["nuclei"], focus["nuclei"]);
 }
@@ -199,7 +199,7 @@ fn a_folder_of_planes_gives_the_law_in_planes() {
 #[test]
 fn edges_are_found_and_measured() {
     let bench = Bench::new("calibrate-edge");
-    // An edge at an angle, with a disk and noise beside it.
+    // An oblique edge with a disk and noise.
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(0xED6E);
     let noise: Vec<f64> = (0..SIDE * SIDE).map(|_| (0..12).map(|_| uniform(&mut rng, -0.5, 0.5)).sum()).collect();
     let drawn = image(SIDE, |x, y| {
@@ -217,14 +217,14 @@ fn edges_are_found_and_measured() {
         assert!((found["normal"][0].as_f64().unwrap() - 0.8).abs() < 0.02, "{line}: {found}");
         let gaussian = toml(&bench, "calibration/optics-gaussian.toml", "optics");
         assert!((number(&gaussian, "sigma_xy_um") - 0.18).abs() < 0.006, "{gaussian}");
-        // What is not measured is the paper's.
+        // Values that are not measured are those of the paper.
         assert_eq!(number(&gaussian, "sigma_z_um_per_um"), 0.25);
         assert!(run.out.contains("sigma_xy") && bench.path("calibration/edge.svg").exists());
     }
 }
 
 #[test]
-fn blur_beyond_the_lens_is_told_from_that_of_the_lens() {
+fn extra_blur_is_separated_from_diffraction() {
     let bench = Bench::new("calibrate-extra");
     let half = |x: f64, y: f64| 0.15 * libm::erfc(-(0.8 * x + 0.6 * y) / (0.03 * 2_f64.sqrt()));
     let sharp = &bright_field(0.41, &[0.0], half)[0];
@@ -239,7 +239,7 @@ fn blur_beyond_the_lens_is_told_from_that_of_the_lens() {
     }
 }
 
-/// Frames of one light; all are `SIDE` pixels wide and high.
+/// Frames of one light, `SIDE` x `SIDE` pixels.
 fn expose(camera: &Camera, folder: PathBuf, names: &[&str], electrons: f32, rng: &mut Xoshiro256PlusPlus) {
     fs::create_dir_all(&folder).unwrap();
     for name in names {
@@ -249,7 +249,7 @@ fn expose(camera: &Camera, folder: PathBuf, names: &[&str], electrons: f32, rng:
     }
 }
 
-/// A camera of 12 bits with everything that photon transfer measures.
+/// A camera of 12 bits with all properties that photon transfer measures.
 fn camera() -> CameraParams {
     CameraParams {
         bit_depth: 12,
@@ -281,7 +281,8 @@ fn flats_give_the_camera() {
         let value = found[key].as_f64().unwrap();
         assert!((value - expected).abs() < within, "{key}: {value}, not {expected} within {within}");
     };
-    // A variance of n pixels has a standard error of √(2 ∕ n): 0.8 % here for pairs; bounds are three and more of them.
+    // A variance of n pixels has a standard error of √(2 ∕ n): 0.8 % here for pairs; bounds are at least three times
+    // larger.
     is("gain_dn_per_e", 0.25, 0.005);
     is("offset_dn", 100.0, 0.05);
     is("dark_noise_e", 9.0, 0.3);
@@ -304,7 +305,7 @@ fn flats_give_the_camera() {
     assert!(rows[0].contains("Dark") && rows[6].contains("100ms"), "{}", run.out);
     assert!(fs::read_to_string(bench.path("calibration/photon-transfer.svg")).unwrap().contains("Photon transfer"));
 
-    // The same light in pairs of files, the dark elsewhere.
+    // Pairs of files, and dark frames in another folder.
     for (k, electrons) in [1000.0, 4000.0, 8000.0].into_iter().enumerate() {
         let names = [format!("{k}a.tif"), format!("{k}b.tif")];
         expose(&camera, bench.path("pairs"), &names.each_ref().map(String::as_str), electrons, &mut rng);
@@ -315,7 +316,7 @@ fn flats_give_the_camera() {
 }
 
 #[test]
-fn flats_that_cannot_be_used_are_refused() {
+fn invalid_flats_are_rejected() {
     let bench = Bench::new("calibrate-bad-flat");
     let (camera, mut rng) = (Camera::new(&camera()).unwrap(), Xoshiro256PlusPlus::seed_from_u64(0xBAD));
     let mut frames = |folder: &str, names: &[&str], electrons: f32| {
@@ -324,42 +325,42 @@ fn flats_that_cannot_be_used_are_refused() {
     frames("darks", &PAIR, 0.0);
     frames("white", &PAIR, 60_000.0);
     frames("white", &["3.tif", "4.tif"], 90_000.0);
-    refused(&bench, "--flat white --dark darks --bits 12", &["--flat white", "levels of flats are saturated", "4095"]);
+    rejected(&bench, "--flat white --dark darks --bits 12", &["--flat white", "levels of flats are saturated", "4095"]);
     frames("sizes/5ms", &PAIR, 4000.0);
     fs::create_dir(bench.path("sizes/10ms")).unwrap();
     for name in PAIR {
         write_grey16(bench.path("sizes/10ms").join(name), &[900; 64 * 32], 64);
     }
-    refused(&bench, "--flat sizes --dark darks --bits 12", &["10ms", "64 x 32 pixels, others 128 x 128", "one size"]);
-    refused(&bench, "--flat sizes --bits 12", &["--flat sizes: no dark frames", "--dark"]);
+    rejected(&bench, "--flat sizes --dark darks --bits 12", &["10ms", "found 64 x 32 pixels, expected 128 x 128", "same size"]);
+    rejected(&bench, "--flat sizes --bits 12", &["--flat sizes: no dark frames", "--dark"]);
     fs::remove_dir_all(bench.path("sizes/10ms")).unwrap();
-    refused(&bench, "--flat sizes --dark darks", &["16 bits do not tell", "--bits"]);
-    refused(&bench, "--flat sizes --dark darks --bits 8", &["--bits is 8, but", "grey level"]);
-    refused(&bench, "--flat sizes --dark darks --bits 17", &["17 is not in 8..=16"]);
-    refused(&bench, "--flat sizes --dark no-such --bits 12", &["no-such", "no such folder"]);
-    refused(&bench, "--flat no-such --dark darks --bits 12", &["no-such"]);
+    rejected(&bench, "--flat sizes --dark darks", &["bit depth of the camera is unknown", "--bits"]);
+    rejected(&bench, "--flat sizes --dark darks --bits 8", &["--bits 8: ", "grey level"]);
+    rejected(&bench, "--flat sizes --dark darks --bits 17", &["expected an integer from 8 to 16"]);
+    rejected(&bench, "--flat sizes --dark no-such --bits 12", &["no-such", "no such folder"]);
+    rejected(&bench, "--flat no-such --dark darks --bits 12", &["no-such"]);
     frames("alike/1", &PAIR, 0.0);
-    refused(&bench, "--flat alike --dark darks --bits 12", &["alike: the brightest level is", "at least 1 %"]);
+    rejected(&bench, "--flat alike --dark darks --bits 12", &["alike: the brightest level is", "at least 1 %"]);
     frames("odd", &["1.tif", "2.tif", "3.tif"], 4000.0);
-    refused(&bench, "--flat odd --dark darks --bits 12", &["3 files; expected pairs"]);
+    rejected(&bench, "--flat odd --dark darks --bits 12", &["3 files; expected an even number"]);
     frames("single/5ms", &["1.tif"], 4000.0);
-    refused(&bench, "--flat single --dark darks --bits 12", &["5ms: 1 frame; expected 2 or more"]);
+    rejected(&bench, "--flat single --dark darks --bits 12", &["5ms: 1 frame; expected 2 or more"]);
     frames("both/5ms", &PAIR, 4000.0);
     frames("both/dark", &PAIR, 0.0);
-    refused(&bench, "--flat both --dark darks --bits 12", &["--dark", "dark frames of its own"]);
+    rejected(&bench, "--flat both --dark darks --bits 12", &["--dark", "already holds dark frames"]);
     let cut = Camera::new(&CameraParams { offset_dn: 0.0, ..self::camera() }).unwrap();
     expose(&cut, bench.path("cut"), &PAIR, 0.0, &mut rng);
-    refused(&bench, "--flat sizes --dark cut --bits 12", &["cut", "raise the offset"]);
+    rejected(&bench, "--flat sizes --dark cut --bits 12", &["cut", "raise the offset"]);
     fs::create_dir_all(bench.path("tiny/dark")).unwrap();
     for name in PAIR {
         write_grey16(bench.path("tiny/dark").join(name), &[100; 12 * 12], 12);
         write_grey16(bench.path("tiny").join(name), &[900; 12 * 12], 12);
     }
-    refused(&bench, "--flat tiny --bits 12", &["12 x 12 pixels", "more than 15 pixels"]);
+    rejected(&bench, "--flat tiny --bits 12", &["12 x 12 pixels", "more than 15 pixels"]);
 }
 
 #[test]
-fn stacks_and_edges_that_cannot_be_measured_are_refused() {
+fn invalid_stacks_and_edges_are_rejected() {
     let bench = Bench::new("calibrate-bad");
     let planes = three_nuclei(19);
     let write = |name: &str, planes: &[Vec<f32>]| write_pages(bench.path(name), planes, 192);
@@ -368,48 +369,48 @@ fn stacks_and_edges_that_cannot_be_measured_are_refused() {
     write("two.tif", &planes[..2]);
     write("flat.tif", &vec![vec![5.0; 192 * 192]; 4]);
     let one = "18,26,44,38";
-    refused(&bench, "", &["--stack", "--edge", "--flat"]);
-    refused(&bench, "--stack end.tif", &["--stack end.tif: window ", "the stack's end", "both sides of focus"]);
-    refused(&bench, &format!("--stack end.tif --window {one}"), &["window 18,26,44,38", "the stack's end"]);
-    refused(&bench, "--stack two.tif", &["--stack two.tif: 2 planes; expected 3 or more"]);
-    refused(&bench, "--stack flat.tif", &["no dark, compact thing", "--window"]);
-    refused(&bench, "--stack flat.tif --window 0,0,20,20", &["holds no detail"]);
-    refused(&bench, "--stack stack.tif --window 180,0,20,20", &["inside the image of 192 x 192", "--window X,Y,W,H"]);
-    refused(&bench, "--stack stack.tif --window 1,1,4,4", &["at least 8 pixels"]);
-    refused(&bench, "--stack stack.tif --window 1,1,9", &["expected X,Y,W,H"]);
-    refused(&bench, "--stack stack.tif --window 1,1,9,99999999999", &["up to 1048576"]);
+    rejected(&bench, "", &["--stack", "--edge", "--flat"]);
+    rejected(&bench, "--stack end.tif", &["--stack end.tif: window ", "the stack's end", "both sides of focus"]);
+    rejected(&bench, &format!("--stack end.tif --window {one}"), &["window 18,26,44,38", "the stack's end"]);
+    rejected(&bench, "--stack two.tif", &["--stack two.tif: planes: found 2, expected 3 or more"]);
+    rejected(&bench, "--stack flat.tif", &["no nucleus found", "--window"]);
+    rejected(&bench, "--stack flat.tif --window 0,0,20,20", &["holds no detail"]);
+    rejected(&bench, "--stack stack.tif --window 180,0,20,20", &["inside the image of 192 x 192", "--window X,Y,W,H"]);
+    rejected(&bench, "--stack stack.tif --window 1,1,4,4", &["at least 8 pixels"]);
+    rejected(&bench, "--stack stack.tif --window 1,1,9", &["expected X,Y,W,H"]);
+    rejected(&bench, "--stack stack.tif --window 1,1,9,99999999999", &["up to 1048576"]);
     for bad in ["0", "101", "nan", "x"] {
-        refused(&bench, &format!("--stack stack.tif --step-um {bad}"), &["--step-um", "more than 0 and at most 100"]);
+        rejected(&bench, &format!("--stack stack.tif --step-um {bad}"), &["--step-um", "more than 0 and at most 100"]);
     }
-    refused(&bench, "--stack stack.tif --pixel-um 9", &["--pixel-um", "0.05 to 4"]);
-    refused(&bench, "--stack stack.tif --na 1.2", &["--na is 1.2", "at most immersion-index"]);
-    refused(&bench, "--stack stack.tif --wavelength-um 570", &["--wavelength-um is 570", "0.1 to 10"]);
-    refused(&bench, "--stack stack.tif --mount-index nan", &["--mount-index is NaN", "1 to 3"]);
-    refused(&bench, "--stack no-such.tif", &["no-such.tif: there is no such file"]);
-    refused(&bench, "--stack .", &["plane"]);
-    refused(&bench, "--step-um 1 --edge stack.tif", &["--stack"]);
-    refused(&bench, "--edge stack.tif", &["--edge stack.tif: 19 images; expected one"]);
+    rejected(&bench, "--stack stack.tif --pixel-um 9", &["--pixel-um", "0.05 to 4"]);
+    rejected(&bench, "--stack stack.tif --na 1.2", &["--na 1.2", "at most immersion-index"]);
+    rejected(&bench, "--stack stack.tif --wavelength-um 570", &["--wavelength-um 570", "0.1 to 10"]);
+    rejected(&bench, "--stack stack.tif --mount-index nan", &["--mount-index NaN", "1 to 3"]);
+    rejected(&bench, "--stack no-such.tif", &["no-such.tif: there is no such file"]);
+    rejected(&bench, "--stack .", &["plane"]);
+    rejected(&bench, "--step-um 1 --edge stack.tif", &["--stack"]);
+    rejected(&bench, "--edge stack.tif", &["--edge stack.tif: 19 images; expected 1"]);
     write("one.tif", &planes[9..10]);
-    refused(&bench, "--edge one.tif --line 0,0,4,0", &["line 0,0,4,0", "192 x 192", "at least 8 pixels long"]);
-    refused(&bench, "--edge one.tif --line 180,10,220,10", &["does not lie in"]);
-    refused(&bench, "--edge one.tif --line 1,2,3", &["expected X0,Y0,X1,Y1"]);
-    refused(&bench, "--edge one.tif --line 1,2,3,inf", &["expected X0,Y0,X1,Y1"]);
+    rejected(&bench, "--edge one.tif --line 0,0,4,0", &["line 0,0,4,0", "192 x 192", "at least 8 pixels long"]);
+    rejected(&bench, "--edge one.tif --line 180,10,220,10", &["extends beyond the"]);
+    rejected(&bench, "--edge one.tif --line 1,2,3", &["expected X0,Y0,X1,Y1"]);
+    rejected(&bench, "--edge one.tif --line 1,2,3,inf", &["expected X0,Y0,X1,Y1"]);
     write("even.tif", &[vec![5.0; 192 * 192]]);
-    refused(&bench, "--edge even.tif", &["no straight edge was found", "--line"]);
-    refused(&bench, "--edge even.tif --line 50,50,80,50", &["holds no edge"]);
+    rejected(&bench, "--edge even.tif", &["no straight edge found", "--line"]);
+    rejected(&bench, "--edge even.tif --line 50,50,80,50", &["holds no edge"]);
     fs::write(bench.path("text.tif"), "no image").unwrap();
-    refused(&bench, "--edge text.tif", &["text.tif: is neither a PNG nor a TIFF"]);
+    rejected(&bench, "--edge text.tif", &["text.tif: is neither a PNG nor a TIFF"]);
 }
 
 #[test]
-fn a_folder_gathers_one_microscope_and_replaces_nothing_else() {
+fn a_folder_holds_one_microscope_and_other_files_are_not_replaced() {
     let bench = Bench::new("calibrate-out");
     let edge = image(64, |x, _| 100.0 + 60.0 * libm::erf((x - 31.7) / (0.8 * 2_f64.sqrt())));
     write_pages(bench.path("edge.tif"), &[edge], 64);
     write_pages(bench.path("stack.tif"), &three_nuclei(19), 192);
     bench.good("calibrate --stack stack.tif --step-um 0.5 --pixel-um 0.25 --window 18,26,44,38 --na 0.75 --out out");
     let first = toml(&bench, "out/optics.toml", "optics");
-    // The second run keeps what the first has measured.
+    // The second run keeps the measurements of the first.
     bench.good("calibrate --edge edge.tif --pixel-um 0.25 --na 0.75 --out out");
     let both = toml(&bench, "out/optics.toml", "optics");
     assert_eq!(first["condenser_na"], both["condenser_na"]);
@@ -418,34 +419,34 @@ fn a_folder_gathers_one_microscope_and_replaces_nothing_else() {
     assert!((number(&gaussian, "sigma_xy_um") - 0.2).abs() < 0.01, "{gaussian}");
     assert!((number(&gaussian, "sigma_z_um_per_um") - 0.3).abs() < 0.01, "{gaussian}");
     let before = bench.files("out");
-    // The same command, the same bytes.
+    // The same command writes the same bytes.
     bench.good("calibrate --edge edge.tif --pixel-um 0.25 --na 0.75 --out out");
     assert_eq!(bench.files("out"), before);
-    // Another microscope, another file of one of the names, a file in the folder's place.
-    let refused = |words: &str, named: &str| {
+    // Another microscope, another file with one of the names, and a file instead of the folder.
+    let rejected = |words: &str, named: &str| {
         let run = bench.run(&format!("calibrate --edge edge.tif {words}"));
         assert_eq!(run.code, 2, "{}{}", run.out, run.err);
         assert!(run.err.contains(named), "{named}: {}", run.err);
     };
-    refused("--pixel-um 0.25 --out out", "was measured with --na 0.75; this command has 0.95");
+    rejected("--pixel-um 0.25 --out out", "measured with --na 0.75; this command has --na 0.95");
     assert_eq!(bench.files("out"), before);
     fs::create_dir(bench.path("mine")).unwrap();
     fs::write(bench.path("mine/optics.toml"), "[optics]\n").unwrap();
-    refused("--out mine", "another kind of file");
+    rejected("--out mine", "the file exists and is not a recipe of papsynth calibrate");
     fs::write(bench.path("mine/optics.toml"), "").unwrap();
     fs::write(bench.path("mine/calibration.json"), "{\n  \"calibration\": 1,\n  \"more\": 2\n}").unwrap();
-    refused("--out mine", "no calibration of this program");
+    rejected("--out mine", "not a calibration of papsynth");
     fs::write(bench.path("mine/calibration.json"), "{\n  \"calibration\": 7\n}").unwrap();
-    refused("--out mine", "of version 7; this program knows 1");
+    rejected("--out mine", "version 7; expected version 1");
     assert_eq!(bench.files("mine").len(), 2);
-    refused("--out edge.tif", "expected a folder");
+    rejected("--out edge.tif", "expected a folder");
     let full = bench.run("calibrate --edge edge.tif --out /proc/papsynth");
     assert!(full.code == 2 || full.code == 74, "{}", full.err);
 }
 
-/// Fragments are recipes: what is not in them is the default.
+/// The sections are recipes with default values for all other fields.
 #[test]
-fn fragments_are_recipes() {
+fn sections_are_recipes() {
     let bench = Bench::new("calibrate-recipe");
     let edge = image(64, |x, _| 100.0 + 60.0 * libm::erf((x - 31.7) / (0.8 * 2_f64.sqrt())));
     write_pages(bench.path("edge.tif"), &[edge], 64);
@@ -461,7 +462,7 @@ fn fragments_are_recipes() {
     assert!(bench.run("preview --with edge.tif --out none.png").err.contains("edge.tif"));
 }
 
-/// A folder of real images, or none with a message; on a build server there must be one.
+/// A folder of real images. Without `PAPSYNTH_REFERENCE`, tests are skipped, except on CI.
 fn reference(folder: &str) -> Option<PathBuf> {
     let Some(root) = std::env::var_os("PAPSYNTH_REFERENCE") else {
         assert!(std::env::var("CI").as_deref() != Ok("true"), "PAPSYNTH_REFERENCE is not set");
@@ -486,8 +487,8 @@ fn the_real_stack_is_linear_and_symmetric() {
         assert!(value(side, "r_squared") > 0.99, "{side}: {}", focus[side]);
     }
     assert!((value("before", "slope_px") - value("after", "slope_px")).abs() < 0.05, "{focus}");
-    // Masks among the planes are no planes.
+    // Masks are not planes.
     let run = bench.run(&format!("calibrate --stack {} --out folder", folder.display()));
     assert_eq!(run.code, 2, "{}", run.out);
-    assert!(run.err.contains("no masks among them"), "{}", run.err);
+    assert!(run.err.contains("no masks"), "{}", run.err);
 }

@@ -1,13 +1,13 @@
-//! The program from outside: exit codes, messages, files.
+//! Exit codes, messages and files of the program.
 
-#[allow(dead_code, reason = "each test uses its part")]
+#[allow(dead_code, reason = "each test uses a part")]
 use crate::support;
 use std::collections::BTreeMap;
 use std::fs;
 
 use crate::support::{Bench, TINY};
 
-/// Texts that are no recipe, each with something that its message must name.
+/// Invalid recipes, each with a part of the expected message.
 const HOSTILE: [(&str, &str); 74] = [
     ("", "holds no setting"),
     ("\n\n# nothing but a comment\n", "holds no setting"),
@@ -67,7 +67,7 @@ const HOSTILE: [(&str, &str); 74] = [
     ("[camera]\nbits = 17", "camera.bits"),
     ("[camera]\noffset_dn = 200", "camera.offset_dn"),
     ("[camera]\nphoton_noise = \"poison\"", "camera.photon_noise: `poison` is not known"),
-    ("[background]\nlevel = 0.02\nscatter = 0.4", "background.scatter"),
+    ("[background]\nlevel = 0.02\ntexture = 0.4", "background.texture"),
     ("[background.illumination]\nkind = \"bowl\"\nexponent = 1", "background.illumination.exponent"),
     ("[layout]\nkind = \"cluster\"", "did you mean `clusters`?"),
     ("[layout]\nkind = \"map\"", "missing field `path`"),
@@ -86,29 +86,29 @@ const HOSTILE: [(&str, &str); 74] = [
 ];
 
 #[test]
-fn hostile_recipes_are_refused_with_the_field_and_leave_nothing_behind() {
+fn invalid_recipes_are_rejected_with_the_field_and_no_file_is_written() {
     let bench = Bench::new("hostile");
     let mut wrong = Vec::new();
     for (text, named) in HOSTILE {
         fs::write(bench.path("recipe.toml"), text).unwrap();
         let run = bench.run("generate recipe.toml --out out --frames 1");
         if run.code != 2 || !run.err.contains(named) || !run.err.contains("recipe.toml") || bench.path("out").exists() {
-            wrong.push(format!("--- {text:?}: wanted 2 and {named:?}, got {}\n{}", run.code, run.err));
+            wrong.push(format!("--- {text:?}: expected 2 and {named:?}, got {}\n{}", run.code, run.err));
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 #[test]
-fn what_is_no_text_or_too_much_is_refused() {
+fn binary_files_and_large_files_are_rejected() {
     let bench = Bench::new("garbage");
     let garbage: Vec<u8> = (0..4096_u32).map(|i| (i * 193 + 7).to_le_bytes()[0]).collect();
     let deep = format!("[field]\nwidth_px = {}1{}", "[".repeat(50_000), "]".repeat(50_000));
     let dotted = format!("{}b = 1", "a.".repeat(50_000));
     let long = format!("[field]\nwidth_px = \"{}\"", "x".repeat(1_000_000));
     let cases: [(&[u8], &str); 7] = [
-        (&garbage, "recipe.toml:1: the byte 0x"),
-        (&[0xff, 0xfe, 0x00], "the byte 0xff is no text"),
+        (&garbage, "recipe.toml:1: not valid UTF-8 at byte"),
+        (&[0xff, 0xfe, 0x00], "not valid UTF-8 at byte 0"),
         (&[0; 64], "recipe.toml:1"),
         (deep.as_bytes(), "recipe.toml:2"),
         (dotted.as_bytes(), "recipe.toml: recursion limit"),
@@ -126,7 +126,7 @@ fn what_is_no_text_or_too_much_is_refused() {
 }
 
 #[test]
-fn usage_is_refused_with_code_2() {
+fn wrong_usage_has_exit_code_2() {
     let bench = Bench::new("usage");
     for words in [
         "",
@@ -138,6 +138,7 @@ fn usage_is_refused_with_code_2() {
         "generate --out out --range 5",
         "generate --out out --frames 1 --threads 0",
         "generate --out out --frames 1 --seed -1",
+        "generate --out out --frames 1 --shard 0/2",
         "generate --out out --frames 1 --preset lcb",
         "generate --out out --frames 1 --set field.width_px",
         "generate --out out --frames 1 --set field.width_px=wide",
@@ -191,12 +192,16 @@ fn every_preset_prints_a_recipe_that_reads_back() {
         assert_eq!(toml::from_str::<papsynth::recipe::Recipe>(&text).unwrap(), preset.recipe());
     }
     bench.good("init --out mine.toml");
+    fs::write(bench.path("mine.toml"), "edited").unwrap();
     let again = bench.run("init --out mine.toml");
-    assert_eq!(again.code, 2, "a recipe is never replaced: {}", again.err);
+    assert!(again.code == 2 && again.err.contains("--force"), "{}", again.err);
+    assert_eq!(fs::read_to_string(bench.path("mine.toml")).unwrap(), "edited");
+    bench.good("init --out mine.toml --force");
+    assert_ne!(fs::read_to_string(bench.path("mine.toml")).unwrap(), "edited");
 }
 
 #[test]
-fn a_closed_pipe_is_no_failure() {
+fn a_closed_pipe_is_not_an_error() {
     let bench = Bench::new("pipe");
     for verb in ["schema", "init", "completions bash", "--help"] {
         assert_eq!(bench.run_into_closed_pipe(verb), Some(0), "{verb}");
@@ -218,13 +223,13 @@ fn the_bytes_do_not_depend_on_threads_ranges_or_order() {
         bench.good(&format!("generate --out ranges --range {range} --threads 2 {TINY}"));
     }
     assert_eq!(bench.files("ranges"), expected);
-    // Another seed is another data set.
+    // Another seed gives other images.
     bench.good(&format!("generate --out other --frames 1 --seed 1 {TINY}"));
     assert_ne!(bench.files("other")["images/000000.png"], expected["images/000000.png"]);
 }
 
 #[test]
-fn a_second_run_completes_what_is_missing_and_touches_nothing_else() {
+fn a_second_run_writes_only_missing_frames() {
     let bench = Bench::new("resume");
     let command = format!("generate --out out --frames 3 {TINY}");
     bench.good(&command);
@@ -232,7 +237,7 @@ fn a_second_run_completes_what_is_missing_and_touches_nothing_else() {
     fs::remove_file(bench.path("out/images/000001.png")).unwrap();
     fs::write(bench.path("out/images/.leftover.tmp"), "half").ok();
     let run = bench.good(&command);
-    assert!(run.out.contains("1 frame made, 2 were there"), "{}", run.out);
+    assert!(run.out.contains("1 frame written, 2 already present"), "{}", run.out);
     let mut after = bench.files("out");
     after.retain(|name, _| before.contains_key(name));
     assert_eq!(after, before);
@@ -246,7 +251,7 @@ fn a_second_run_completes_what_is_missing_and_touches_nothing_else() {
 }
 
 #[test]
-fn a_strange_folder_or_another_data_set_is_left_alone() {
+fn other_folders_and_other_data_sets_are_not_changed() {
     let bench = Bench::new("strange");
     fs::create_dir(bench.path("photos")).unwrap();
     fs::write(bench.path("photos/cat.txt"), "meow").unwrap();
@@ -266,7 +271,7 @@ fn a_strange_folder_or_another_data_set_is_left_alone() {
 }
 
 #[test]
-fn what_cannot_be_placed_is_refused_before_anything_is_written() {
+fn invalid_layouts_are_rejected_before_a_file_is_written() {
     let bench = Bench::new("layout");
     let tiny = TINY.replace("--set layout.kind=uniform", "");
     bench.grey_png("black.png", 8, 8, |_, _| 0);
@@ -279,7 +284,7 @@ fn what_cannot_be_placed_is_refused_before_anything_is_written() {
         assert!(run.err.contains(named) && run.err.contains("recipe.toml:3"), "{}", run.err);
         assert!(!bench.path("out").exists());
     }
-    // The path is relative to the recipe, not to where the program runs.
+    // The path is relative to the recipe, not to the working folder.
     fs::create_dir(bench.path("deep")).unwrap();
     fs::rename(bench.path("left.png"), bench.path("deep/left.png")).unwrap();
     fs::write(bench.path("deep/recipe.toml"), "[layout]\nkind = \"map\"\npath = \"left.png\"\n").unwrap();
@@ -288,65 +293,66 @@ fn what_cannot_be_placed_is_refused_before_anything_is_written() {
 
 #[cfg(unix)]
 #[test]
-fn what_cannot_be_written_ends_with_code_74() {
+fn write_errors_have_exit_code_74() {
     let bench = Bench::new("full");
     let run = bench.run(&format!("preview --out /dev/full/preview.png {TINY}"));
     assert!(run.code == 2 || run.code == 74, "{}", run.err);
-    // Nothing can be made below /proc, whoever asks.
+    // No user can create files below /proc.
     let run = bench.run(&format!("generate --out /proc/papsynth-out --frames 1 {TINY}"));
     assert_eq!(run.code, 74, "{}", run.err);
     assert!(run.err.contains("/proc/papsynth-out"), "{}", run.err);
 }
 
 #[test]
-fn json_tells_start_frames_and_end() {
+fn json_events_are_start_frames_and_done() {
     let bench = Bench::new("json");
     let run = bench.good(&format!("generate --out out --frames 2 --json {TINY}"));
     let events: Vec<serde_json::Value> = run.out.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let names: Vec<_> = events.iter().map(|event| event["event"].as_str().unwrap()).collect();
     assert_eq!(names, ["start", "frame", "frame", "done"]);
     assert_eq!(events[0]["frames"], 2);
-    assert_eq!(events[3]["made"], 2);
+    assert_eq!((&events[2]["done"], &events[2]["total"], &events[2]["eta_s"]), (&2.into(), &2.into(), &0.into()));
+    assert_eq!((&events[3]["written"], &events[3]["present"]), (&2.into(), &0.into()));
     assert_eq!(run.err, "");
     let run = bench.run("generate --out out2 --frames 2 --json --set field.width_px=-1");
     assert_eq!(run.code, 2);
     let error: serde_json::Value = serde_json::from_str(run.out.trim()).unwrap();
     assert_eq!((error["event"].as_str(), error["exit"].as_i64()), (Some("error"), Some(2)));
-    assert_eq!(error["at"]["file"], "--set");
+    assert_eq!(error["location"]["file"], "--set");
     assert!(error["message"].as_str().unwrap().contains("field.width_px"));
 }
 
 #[test]
-fn a_profile_accounts_for_the_time_and_changes_no_byte() {
+fn a_profile_adds_up_to_the_run_time_and_does_not_change_the_output() {
     let bench = Bench::new("profile");
     let run = bench.good(&format!("generate --out out --frames 2 --threads 1 --json --profile {TINY}"));
     let event: serde_json::Value = serde_json::from_str(run.out.lines().last().unwrap()).unwrap();
     assert_eq!(event["event"], "profile");
     let stages = event["stages"].as_array().unwrap();
-    let spent: f64 = stages.iter().map(|stage| stage["ms_a_frame"].as_f64().unwrap()).sum();
-    // Stages do not overlap, so one thread cannot have spent more than there was.
+    let spent: f64 = stages.iter().map(|stage| stage["ms_per_frame"].as_f64().unwrap()).sum();
+    // Stages of one thread do not overlap.
     assert!(spent > 0.0 && spent * event["frames_per_s"].as_f64().unwrap() <= 1000.0, "{event}");
     assert!(["pixels_per_s", "objects_per_s"].iter().all(|rate| event[rate].as_f64().unwrap() > 0.0), "{event}");
     let run = bench.good(&format!("generate --out told --frames 2 --profile {TINY}"));
     let named = |name: &str| run.out.lines().any(|line| line.starts_with(name));
     assert!(stages.iter().all(|stage| named(stage["stage"].as_str().unwrap())), "{}", run.out);
-    assert!(named("all stages") && run.out.contains("frames a second on"), "{}", run.out);
+    assert!(named("all stages") && run.out.contains("per second on"), "{}", run.out);
     bench.good(&format!("generate --out plain --frames 2 {TINY}"));
     assert_eq!(bench.files("told"), bench.files("plain"));
 }
 
 #[test]
-fn quiet_says_nothing_and_plain_lines_name_frames() {
+fn quiet_prints_nothing_and_progress_lines_name_frames() {
     let bench = Bench::new("quiet");
     let run = bench.good(&format!("generate --out out --frames 1 --quiet {TINY}"));
     assert_eq!((run.out.as_str(), run.err.as_str()), ("", ""));
     let run = bench.good(&format!("generate --out lines --frames 2 {TINY}"));
     assert!(run.err.contains("frame 0: ") && run.err.contains("(2 of 2)"), "{}", run.err);
-    assert!(run.out.contains("lines: 2 frames made"), "{}", run.out);
+    assert!(run.out.contains("lines: 2 frames written"), "{}", run.out);
 }
 
 #[test]
-fn inspect_shows_what_is_there_and_what_is_damaged() {
+fn inspect_lists_contents_and_damage() {
     let bench = Bench::new("inspect");
     bench.good(&format!("generate --out out --range 1..3 {TINY}"));
     let table = bench.good("inspect out").out;
@@ -355,7 +361,7 @@ fn inspect_shows_what_is_there_and_what_is_damaged() {
     }
     let json: serde_json::Value = serde_json::from_str(&bench.good("inspect out --json").out).unwrap();
     assert_eq!(json["frames"], 2);
-    // A flipped bit keeps the size: only reading finds it.
+    // A flipped bit does not change the size.
     let image = bench.path("out/images/000002.png");
     let mut bytes = fs::read(&image).unwrap();
     let last = bytes.len() - 20;
@@ -365,7 +371,7 @@ fn inspect_shows_what_is_there_and_what_is_damaged() {
     let run = bench.run("inspect out --verify");
     assert_eq!(run.code, 2);
     assert!(
-        run.out.contains("damaged     shard 2") && run.err.contains("1 shard and 0 files are damaged"),
+        run.out.contains("damaged     shard 2") && run.err.contains("out: damaged: 1 shard"),
         "{}{}",
         run.out,
         run.err
@@ -373,7 +379,7 @@ fn inspect_shows_what_is_there_and_what_is_damaged() {
 }
 
 #[test]
-fn preview_writes_one_picture() {
+fn preview_writes_one_image() {
     let bench = Bench::new("preview");
     let run = bench.good(&format!("preview --out look.png {TINY}"));
     assert!(run.out.contains("look.png: 96 x 80 px"), "{}", run.out);
@@ -385,7 +391,7 @@ fn preview_writes_one_picture() {
 }
 
 #[test]
-fn no_file_of_another_kind_is_replaced() {
+fn only_older_outputs_are_replaced_without_force() {
     let bench = Bench::new("replace");
     fs::write(bench.path("mine.toml"), bench.good("init").out).unwrap();
     let before = bench.files(".");
@@ -394,13 +400,69 @@ fn no_file_of_another_kind_is_replaced() {
         "learn --class intermediate --pixel-um 0.25 --outlines mine.toml --out mine.toml".to_owned(),
     ] {
         let run = bench.run(&command);
-        assert!(run.code == 2 && run.err.contains("mine.toml: there is another kind of file"), "{}", run.err);
+        assert!(run.code == 2 && run.err.contains("mine.toml: the file exists and is not"), "{}", run.err);
         assert_eq!(bench.files("."), before);
     }
+    // An image of the user, and a model-like file of another program.
+    bench.grey_png("photo.png", 8, 8, |_, _| 7);
+    fs::write(bench.path("other.json"), "{\"version\":1,\"name\":\"other\"}").unwrap();
+    fs::write(bench.path("cells.csv"), support::outlines(12, 100, 80.0)).unwrap();
+    let before = bench.files(".");
+    let tile = format!("slide tile --at 0,0 --size 16,16 --out photo.png {TINY}");
+    for command in [
+        format!("preview --out photo.png {TINY}"),
+        tile.clone(),
+        "learn --class intermediate --pixel-um 0.25 --outlines cells.csv --out other.json".to_owned(),
+    ] {
+        let run = bench.run(&command);
+        assert!(run.code == 2 && run.err.contains("--force"), "{command}: {}", run.err);
+        assert_eq!(bench.files("."), before);
+    }
+    bench.good(&format!("{tile} --force"));
+    bench.good(&tile);
+    bench.good(&format!("preview --out photo.png {TINY}"));
 }
 
 #[test]
-fn a_map_is_kept_in_the_data_set_and_another_map_is_another_recipe() {
+fn control_characters_are_not_printed_and_long_lines_are_shortened() {
+    let bench = Bench::new("control");
+    fs::write(bench.path("recipe.toml"), "[field]\n\"\\u001b[31mred\" = 1\n").unwrap();
+    let run = bench.run("preview recipe.toml");
+    assert!(run.code == 2 && run.err.contains("\\u{1b}[31mred"), "{}", run.err);
+    let name = "no\u{1b}[2J.toml";
+    let run = bench.run(&format!("preview {name}"));
+    assert!(run.code == 2 && !run.err.contains('\u{1b}'), "{:?}", run.err);
+    let run = bench.run("preview --ind\u{1b}[2J=1");
+    assert!(run.code == 2 && !run.err.contains('\u{1b}'), "{:?}", run.err);
+    fs::write(bench.path("model.toml"), format!("version = 1\nx = [{}\n", "1,".repeat(500_000))).unwrap();
+    let run = bench.run("preview --model model.toml");
+    assert!(run.code == 2 && run.err.contains("model.toml:") && run.err.len() < 1000, "{}", run.err);
+}
+
+/// A full disk in memory; skipped where the system does not allow to mount one.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_leaves_no_part_of_a_single_file() {
+    const SCRIPT: &str = r#"
+        mkdir disk && mount -t tmpfs -o size=8k tmpfs disk || { echo 'no disk'; exit 0; }
+        echo old > disk/old.toml
+        "$1" init --out disk/new.toml 2> message; echo "new $?"
+        "$1" init --out disk/old.toml --force 2>> message; echo "old $?"
+        ls -A disk; cat disk/old.toml
+        umount disk
+    "#;
+    let bench = Bench::new("full-disk-init");
+    let Some(printed) = bench.script_as_root(SCRIPT, "").filter(|printed| !printed.contains("no disk")) else {
+        eprintln!("skipped: this system does not allow to mount a small disk");
+        return;
+    };
+    assert_eq!(printed, "new 74\nold 74\nold.toml\nold\n");
+    let message = fs::read_to_string(bench.path("message")).unwrap();
+    assert!(message.contains("disk/new.toml") && message.contains("No space left"), "{message}");
+}
+
+#[test]
+fn a_density_map_is_stored_and_part_of_the_recipe() {
     let bench = Bench::new("map");
     let map = |side: usize| {
         let mut bytes = Vec::new();
@@ -414,11 +476,11 @@ fn a_map_is_kept_in_the_data_set_and_another_map_is_another_recipe() {
     let command = format!("generate --out out --frames 1 {TINY} --set layout.kind=map --set layout.path=map.png");
     bench.good(&command);
     let made = bench.files("out");
-    let kept = made.keys().find(|name| name.starts_with("layout-")).expect("the map is kept");
+    let kept = made.keys().find(|name| name.starts_with("layout-")).expect("the map is stored");
     assert!(kept.ends_with(".png"));
     fs::remove_file(bench.path("map.png")).unwrap();
     bench.good("generate out/recipe.toml --out again --frames 1");
-    assert_eq!(bench.files("again"), made, "the folder holds all it takes");
+    assert_eq!(bench.files("again"), made, "the folder holds all inputs");
     map(1);
     let run = bench.run(&command);
     assert!(run.code == 2 && run.err.contains("another recipe"), "{}", run.err);
@@ -435,7 +497,7 @@ fn all_cells_can_be_set_at_once() {
 
 #[cfg(unix)]
 #[test]
-fn ctrl_c_leaves_whole_files_and_the_same_command_goes_on() {
+fn ctrl_c_leaves_complete_files_and_the_same_command_continues() {
     let bench = Bench::new("interrupt");
     let command = format!("generate --out out --frames 400 --threads 2 {TINY}");
     let run = bench.interrupt_after_first_line(&format!("{command} --json"));
@@ -446,7 +508,7 @@ fn ctrl_c_leaves_whole_files_and_the_same_command_goes_on() {
     let whole = left.keys().filter(|name| name.starts_with("images/")).count();
     assert!(whole < 400);
     bench.good("inspect out --verify");
-    // What is there is kept, byte for byte.
+    // Present files do not change.
     bench.good(&format!("{command} --quiet").replace("400", &whole.max(1).to_string()));
     let after = bench.files("out");
     for (name, content) in left.iter().filter(|(name, _)| name.starts_with("images/")) {
@@ -480,7 +542,7 @@ fn a_class_is_learned_from_outlines_and_used() {
 }
 
 #[test]
-fn nuclei_and_label_images_are_learned_from() {
+fn a_class_is_learned_from_nuclei_and_label_images() {
     let bench = Bench::new("learn-images");
     for folder in ["nuclei/images", "nuclei/masks", "labels"] {
         fs::create_dir_all(bench.path(folder)).unwrap();

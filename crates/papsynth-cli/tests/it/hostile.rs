@@ -1,6 +1,7 @@
-//! Recipes and models that are wrong in every field, and too large in every way: refused by the name of the field, soon, and in little memory.
+//! Recipes and models with invalid values in every field, and of excessive size: rejected with the name of the field,
+//! fast and in little memory.
 
-#[allow(dead_code, reason = "each test uses its part")]
+#[allow(dead_code, reason = "each test uses a part")]
 use std::collections::BTreeSet;
 use std::fs;
 use std::time::{Duration, Instant};
@@ -9,7 +10,7 @@ use crate::support::{Bench, Outcome};
 use papsynth::recipe::{Preset, toml_value};
 use serde_json::{Map, Value};
 
-/// What no field of numbers takes.
+/// Values that no numeric field accepts.
 const NO_NUMBER: [&str; 34] = [
     "nan",
     "-nan",
@@ -47,22 +48,22 @@ const NO_NUMBER: [&str; 34] = [
     "{ uniform = [1, 2], normal = [1, 2] }",
 ];
 
-/// What some fields of numbers take: then the recipe is as good as any.
+/// Values that some numeric fields accept.
 const PERHAPS: [&str; 6] = ["0", "-0.0", "-1", "0.5", "1e-320", "{ normal = [1, 1e-9], min = 0, max = 2 }"];
 
-/// What no word, path or truth value is.
+/// Values that no string or boolean field accepts.
 const NO_WORD: [&str; 6] = ["3", "nan", "[]", "[\"a\"]", "{}", "1979-05-27"];
 
-/// A field of a recipe: where it stands, and the recipe's text around it.
+/// A field of a recipe and the other fields of its section.
 struct Leaf {
     path: String,
-    /// The fields beside it, a line each.
+    /// The other fields of the section, one per line.
     around: String,
     value: Value,
 }
 
 impl Leaf {
-    /// A recipe in which the field is this.
+    /// A recipe with this value of the field.
     fn with(&self, value: &str) -> String {
         match self.path.rsplit_once('.') {
             Some((section, name)) => format!("[{section}]\n{}{name} = {value}\n", self.around),
@@ -71,7 +72,7 @@ impl Leaf {
     }
 }
 
-/// Every field of every kind of section that a preset shows, each once.
+/// All different fields of the presets.
 fn leaves() -> Vec<Leaf> {
     let (mut found, mut known) = (Vec::new(), BTreeSet::new());
     for preset in Preset::ALL {
@@ -82,8 +83,9 @@ fn leaves() -> Vec<Leaf> {
 }
 
 fn is_number(value: &Value) -> bool {
-    let laws = ["uniform", "normal", "log_normal", "choice"];
-    value.is_number() || value.as_object().is_some_and(|table| laws.iter().any(|law| table.contains_key(*law)))
+    let distributions = ["uniform", "normal", "log_normal", "choice"];
+    value.is_number()
+        || value.as_object().is_some_and(|table| distributions.iter().any(|name| table.contains_key(*name)))
 }
 
 fn walk(table: &Map<String, Value>, path: &str, known: &mut BTreeSet<String>, found: &mut Vec<Leaf>) {
@@ -93,7 +95,7 @@ fn walk(table: &Map<String, Value>, path: &str, known: &mut BTreeSet<String>, fo
         match value.as_object().filter(|_| !is_number(value)) {
             Some(inner) => walk(inner, &here, known, found),
             None => {
-                // Classes of cells know the same fields.
+                // Classes of cells have the same fields.
                 let class = here.split('.').nth(1).filter(|_| here.starts_with("cells.")).unwrap_or_default();
                 if known.insert(format!("{kind} {}", here.replace(class, "*"))) {
                     let is_beside = |(other, value): &(&String, &Value)| {
@@ -111,7 +113,7 @@ fn walk(table: &Map<String, Value>, path: &str, known: &mut BTreeSet<String>, fo
     }
 }
 
-/// Runs of the program, how many there were and which took longest.
+/// Runs of the program, with their number, times and errors.
 struct Gauntlet {
     bench: Bench,
     runs: usize,
@@ -120,10 +122,10 @@ struct Gauntlet {
     wrong: Vec<String>,
 }
 
-/// Stands in the command behind the recipe: whoever complains of it has accepted the recipe.
+/// A missing model. An error about the model shows that the recipe was accepted.
 const NO_MODEL: &str = "no-such-model.json";
 
-/// As much memory as the program may ask for, in all.
+/// Address-space limit of the program.
 const MEMORY_KB: u64 = 1 << 20;
 
 impl Gauntlet {
@@ -138,7 +140,7 @@ impl Gauntlet {
     }
 
     fn run(&mut self, what: &str, words: &str) -> Outcome {
-        #[expect(clippy::disallowed_methods, reason = "what takes long is printed, and asserted nowhere")]
+        #[expect(clippy::disallowed_methods, reason = "times are printed, not asserted")]
         let start = Instant::now();
         let run = self.bench.run_within(MEMORY_KB, words);
         let time = start.elapsed();
@@ -155,14 +157,14 @@ impl Gauntlet {
         run
     }
 
-    /// A recipe that may be good where `must` is false, and is refused by this name otherwise.
+    /// Runs a recipe that must be rejected with this name. Without `must`, it may also be accepted.
     fn recipe(&mut self, text: &str, named: &str, must: bool) {
         fs::write(self.bench.path("recipe.toml"), text).unwrap();
         let what = text.chars().take(200).collect::<String>();
         let run = self.run(&what, &format!("generate recipe.toml --out out --frames 1 --model {NO_MODEL}"));
         let accepted = run.err.contains(NO_MODEL);
         if (must && accepted) || !(accepted || run.err.contains(named)) {
-            self.wrong.push(format!("--- {what}: {named:?} is wanted\n{:.2000}", run.err));
+            self.wrong.push(format!("--- {what}: expected {named:?}\n{:.2000}", run.err));
         }
     }
 
@@ -180,12 +182,12 @@ impl Gauntlet {
 }
 
 #[test]
-fn every_field_refuses_what_it_cannot_be_by_its_name() {
+fn every_field_rejects_invalid_values_by_name() {
     let mut gauntlet = Gauntlet::new("fields");
     let leaves = leaves();
     let mut sections = BTreeSet::new();
     for (number, leaf) in leaves.iter().enumerate() {
-        // Without `PAPSYNTH_TORTURE` each field gets a few of the values, so that all meet several fields.
+        // Without `PAPSYNTH_TORTURE`, each field is tested with some of the values.
         let all = std::env::var_os("PAPSYNTH_TORTURE").is_some();
         let mut take = |values: &[&str], count: usize, must: bool| {
             let count = if all { values.len() } else { count.min(values.len()) };
@@ -217,14 +219,14 @@ fn every_field_refuses_what_it_cannot_be_by_its_name() {
 }
 
 #[test]
-fn what_is_too_large_or_too_deep_is_refused_in_little_memory() {
+fn large_and_deeply_nested_files_are_rejected_in_little_memory() {
     const HUGE: usize = 100_000_000;
     let mut gauntlet = Gauntlet::new("huge");
     let text = "x".repeat(HUGE);
     for (open, close) in [("[field]\nwidth_px = \"", "\"\n"), ("# ", "\n"), ("", " = 1\n"), ("[", "]\n")] {
         gauntlet.recipe(&format!("{open}{text}{close}"), "larger than", true);
     }
-    // Deep things of half a megabyte each, which a recipe may have.
+    // Nested values of half a megabyte, within the size limit of recipes.
     const DEEP: usize = 100_000;
     for (text, named) in [
         (format!("[field]\nwidth_px = {}1{}", "[".repeat(DEEP), "]".repeat(DEEP)), "recipe.toml:2"),
@@ -240,7 +242,7 @@ fn what_is_too_large_or_too_deep_is_refused_in_little_memory() {
     ] {
         gauntlet.recipe(&text, named, true);
     }
-    // Models and class files: a text, a number, a list, a depth.
+    // Models and class files: a long string, number and list, and deep nesting.
     let model = |inner: &str| format!("{{\"version\":1,\"name\":{inner}}}");
     for text in [
         model(&format!("\"{text}\"")),

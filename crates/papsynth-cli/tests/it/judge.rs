@@ -1,13 +1,13 @@
-//! `papsynth judge` on fields of our own.
+//! `papsynth judge` on synthetic fields.
 
-#[allow(dead_code, reason = "each test uses its part")]
+#[allow(dead_code, reason = "each test uses a part")]
 use std::fs;
 
 use crate::support::Bench;
 
-/// Small fields that are made quickly and still have nuclei, each of a slide of its own: slides differ by their stain.
+/// Small fields with nuclei, one per slide.
 const FIELD: &str =
-    "--set field.width_px=420 --set field.height_px=320 --set field.pixel_um=0.33 --set slide.fields=1 --quiet";
+    "--set field.width_px=420 --set field.height_px=320 --set field.pixel_um=0.33 --set slide.fields_per_slide=1 --quiet";
 const CELLS: &str = "--set cells.intermediate.count=5 --set cells.superficial.count=2 \
     --set cells.parabasal.count=0 --set cells.metaplastic.count=0";
 
@@ -28,7 +28,7 @@ fn read(bench: &Bench, name: &str) -> (Vec<u8>, u32) {
     (grey, info.width)
 }
 
-/// A folder of images, each made of one of a data set.
+/// A folder of images, computed from those of a data set.
 fn copies(bench: &Bench, from: &str, to: &str, of: impl Fn(&[u8], usize, usize) -> u8) {
     fs::create_dir_all(bench.path(to)).unwrap();
     for index in 0..8 {
@@ -41,30 +41,30 @@ fn copies(bench: &Bench, from: &str, to: &str, of: impl Fn(&[u8], usize, usize) 
 }
 
 #[test]
-fn fields_of_another_seed_pass_and_other_fields_do_not() {
+fn fields_of_another_seed_pass_and_different_fields_do_not() {
     let bench = Bench::new("judge-kinds");
     for (name, seed) in [("a", 1), ("b", 2), ("c", 3), ("d", 4)] {
         generate(&bench, name, &format!("--seed {seed} {CELLS}"));
     }
-    // Each test errs once in twenty: of these six or so, two would once in thirty.
+    // Each test has a false positive rate of 5 %; two in six tests occur once in thirty runs.
     let mut wrong = 0;
     for pair in ["a b", "c d"] {
         let outcome = bench.good(&format!("judge {pair} --out same --quick"));
-        let tests = outcome.out.lines().filter(|line| !line.contains(" synthetic ones: "));
-        wrong += tests.filter(|line| line.ends_with(": told apart")).count();
-        assert!(outcome.out.contains("8 real fields and 8 synthetic ones: "), "{}", outcome.out);
+        let tests = outcome.out.lines().filter(|line| !line.contains(" synthetic fields: "));
+        wrong += tests.filter(|line| line.ends_with(": distinguishable")).count();
+        assert!(outcome.out.contains("8 real fields and 8 synthetic fields: "), "{}", outcome.out);
         assert!(outcome.out.ends_with("same: report.html, report.json\n"), "{}", outcome.out);
         assert!(wrong <= 1, "{}", outcome.out);
     }
     let report = json(&bench, "same/report.json");
     assert_eq!(report["judge_report"], 1);
-    assert_eq!(report["gauge"]["nuclei_from"], "masks");
-    assert_eq!(report["gauge"]["pixel_um"], 0.33);
+    assert_eq!(report["measurement"]["nuclei_from"], "masks");
+    assert_eq!(report["measurement"]["pixel_um"], 0.33);
     let names: Vec<&str> =
         report["two_sample"].as_array().unwrap().iter().map(|t| t["name"].as_str().unwrap()).collect();
     assert!(names.contains(&"nuclei") && names.contains(&"patches"), "{names:?}");
 
-    // Uniform noise; the fields themselves, blurred; nuclei of another grade.
+    // Uniform noise, blurred fields, and nuclei of another grade.
     copies(&bench, "a", "noise", |_, _, i| {
         u8::try_from((i as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 56).unwrap()
     });
@@ -79,13 +79,15 @@ fn fields_of_another_seed_pass_and_other_fields_do_not() {
         "high",
         "--seed 2 --preset high-grade --set cells.high-grade.count=7 --set cells.intermediate.count=0",
     );
-    for (other, test, verdict) in
-        [("noise", "patches", "told apart"), ("blurred", "patches", "told apart"), ("high", "nuclei", "told apart")]
-    {
+    for (other, test, verdict) in [
+        ("noise", "patches", "distinguishable"),
+        ("blurred", "patches", "distinguishable"),
+        ("high", "nuclei", "distinguishable"),
+    ] {
         let outcome = bench.good(&format!("judge a {other} --out {other}-report --quick"));
         let line = outcome.out.lines().find(|line| line.starts_with(test)).unwrap();
         assert!(line.ends_with(&format!(": {verdict}")), "{other}: {}", outcome.out);
-        assert!(outcome.out.contains("synthetic ones: told apart"), "{other}: {}", outcome.out);
+        assert!(outcome.out.contains("synthetic fields: distinguishable"), "{other}: {}", outcome.out);
     }
 }
 
@@ -94,9 +96,9 @@ fn folders_may_hold_points_masks_groups_and_other_pixels() {
     let bench = Bench::new("judge-folders");
     generate(&bench, "a", &format!("--seed 1 {CELLS}"));
     copies(&bench, "a", "slides", |grey, _, i| grey[i]);
-    // Without nuclei they are found; the size of a pixel is that of the other side.
+    // Without nuclei, they are found automatically; the pixel size is that of the other side.
     let searched = bench.good("judge slides a --out searched --quick");
-    assert_eq!(json(&bench, "searched/report.json")["gauge"]["nuclei_from"], "search");
+    assert_eq!(json(&bench, "searched/report.json")["measurement"]["nuclei_from"], "search");
     assert!(searched.out.contains("nuclei"), "{}", searched.out);
     for index in 0..8 {
         fs::write(bench.path(&format!("slides/{index}.csv")), "y,x\n100,120.5\n").unwrap();
@@ -105,12 +107,12 @@ fn folders_may_hold_points_masks_groups_and_other_pixels() {
     fs::write(bench.path("slides/frames.csv"), format!("frame,grade\n{groups}")).unwrap();
     bench.good("judge slides a --out points --quick --group N --pixel-um 0.25");
     let report = json(&bench, "points/report.json");
-    assert_eq!(report["gauge"]["nuclei_from"], "points");
-    assert_eq!(report["gauge"]["pixel_um"], 0.33);
+    assert_eq!(report["measurement"]["nuclei_from"], "points");
+    assert_eq!(report["measurement"]["pixel_um"], 0.33);
     assert_eq!(report["fields"][0], serde_json::json!(["0", "1", "2"]));
     assert_eq!(report["fields"][1].as_array().unwrap().len(), 8);
     bench.good("judge slides a --out points --quick --nuclei search");
-    assert_eq!(json(&bench, "points/report.json")["gauge"]["nuclei_from"], "search");
+    assert_eq!(json(&bench, "points/report.json")["measurement"]["nuclei_from"], "search");
     fs::create_dir(bench.path("slides/masks")).unwrap();
     for index in 0..8 {
         bench.grey_png(&format!("slides/masks/{index}.png"), 420, 320, |x, y| {
@@ -118,11 +120,11 @@ fn folders_may_hold_points_masks_groups_and_other_pixels() {
         });
     }
     bench.good("judge slides a --out masks --quick");
-    assert_eq!(json(&bench, "masks/report.json")["gauge"]["nuclei_from"], "masks");
+    assert_eq!(json(&bench, "masks/report.json")["measurement"]["nuclei_from"], "masks");
 }
 
 #[test]
-fn the_numbers_do_not_depend_on_threads() {
+fn the_report_does_not_depend_on_threads() {
     let bench = Bench::new("judge-threads");
     generate(&bench, "a", &format!("--seed 1 {CELLS}"));
     generate(&bench, "b", &format!("--seed 2 {CELLS}"));
@@ -133,7 +135,7 @@ fn the_numbers_do_not_depend_on_threads() {
 }
 
 #[test]
-fn what_cannot_be_judged_is_named_and_nothing_is_written() {
+fn invalid_input_of_a_judge_is_rejected_and_no_file_is_written() {
     let bench = Bench::new("judge-refused");
     for name in ["few", "flat", "broken", "sizes/masks", "good", "empty"] {
         fs::create_dir_all(bench.path(name)).unwrap();
@@ -165,13 +167,13 @@ fn what_cannot_be_judged_is_named_and_nothing_is_written() {
     for (words, wanted) in [
         ("judge good empty --pixel-um 0.3", "empty: holds no PNG or TIFF file"),
         ("judge good missing --pixel-um 0.3", "missing: there is no such folder"),
-        ("judge good good", "neither folder says how large its pixels are"),
-        ("judge few good --pixel-um 0.3", "few: there is 1 field; at least 2 are needed"),
+        ("judge good good", "neither folder records its pixel size"),
+        ("judge few good --pixel-um 0.3", "few: 1 field; at least 2 are needed"),
         ("judge good flat --pixel-um 0.3", "is the same everywhere"),
         ("judge sizes sizes --pixel-um 0.3", "the mask is 64 x 40, its image 64 x 48"),
         ("judge good broken --pixel-um 0.3", "b.png"),
-        ("judge grades good --pixel-um 0.3 --group H", "grades: no field is of group H"),
-        ("judge good good --pixel-um 0.3 --group Z", "good: no field is of group Z"),
+        ("judge grades good --pixel-um 0.3 --group H", "grades: no field of group H"),
+        ("judge good good --pixel-um 0.3 --group Z", "good: no field of group Z"),
         ("judge points good --pixel-um 0.3", "2 of 2 points lie outside the image of 64 x 48 pixels"),
         ("judge good damaged --pixel-um 0.3", "damaged: shard 1 is not whole"),
         ("judge good good --pixel-um 0.3 --nuclei masks", "--nuclei masks: "),
@@ -183,7 +185,7 @@ fn what_cannot_be_judged_is_named_and_nothing_is_written() {
         assert!(text.contains(wanted), "{words}: {text}");
         assert!(!bench.path("report").exists(), "{words}");
     }
-    // What is no report is not replaced.
+    // Other files are not replaced.
     fs::create_dir(bench.path("mine")).unwrap();
     fs::write(bench.path("mine/report.html"), "my own page").unwrap();
     let outcome = bench.run("judge good good --pixel-um 0.3 --out mine");

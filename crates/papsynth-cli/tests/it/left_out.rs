@@ -1,9 +1,9 @@
-//! Subcommands that a build lacks.
+//! Subcommands without their feature.
 
 use crate::support::Bench;
 
 #[test]
-fn a_subcommand_that_was_left_out_names_its_feature() {
+fn a_subcommand_without_its_feature_names_the_feature() {
     let bench = Bench::new("left-out");
     for (words, feature, is_here) in [
         ("calibrate --stack planes --step-um 0.5", "calibrate", cfg!(feature = "calibrate")),

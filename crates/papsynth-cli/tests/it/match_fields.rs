@@ -1,25 +1,25 @@
-//! `papsynth match` on fields of our own, with a small budget.
+//! `papsynth match` on synthetic fields, with few simulations.
 
-#[allow(dead_code, reason = "each test uses its part")]
+#[allow(dead_code, reason = "each test uses a part")]
 use std::fs;
 
 use crate::support::Bench;
 
-/// Coarse pixels: many cells in few of them.
-const FIELD: &str = "--set field.width_px=340 --set field.height_px=260 --set field.pixel_um=0.5 --set slide.fields=1 \
+/// Large pixels: many cells in a small image.
+const FIELD: &str = "--set field.width_px=340 --set field.height_px=260 --set field.pixel_um=0.5 --set slide.fields_per_slide=1 \
     --set cells.intermediate.count=5 --set cells.superficial.count=2 --set cells.parabasal.count=0 \
     --set cells.metaplastic.count=0 --quiet";
 
 #[test]
-fn the_recipe_that_is_found_makes_fields() {
+fn the_recipe_of_a_match_generates_fields() {
     let bench = Bench::new("match-finds");
     bench.good(&format!(
-        "generate --out real --frames 3 --seed 3 --set background.level=0.8 --set background.scatter=0.004 {FIELD}"
+        "generate --out real --frames 3 --seed 3 --set background.level=0.8 --set background.texture=0.004 {FIELD}"
     ));
-    let outcome = bench.good("match real --out mine.toml --report mine.json --budget 90 --seed 1 --threads 2");
+    let outcome = bench.good("match real --out mine.toml --report mine.json --simulations 90 --seed 1 --threads 2");
     assert!(outcome.out.starts_with("3 fields, 3 windows, "), "{}", outcome.out);
     assert!(outcome.out.ends_with("\nmine.toml: use it with papsynth generate mine.toml\n"), "{}", outcome.out);
-    assert!(outcome.err.contains("simulated recipes (30 of 30)"), "{}", outcome.err);
+    assert!(outcome.err.contains("recipes simulated (30 of 30)"), "{}", outcome.err);
     let toml = fs::read_to_string(bench.path("mine.toml")).unwrap();
     assert!(toml.starts_with("# Matched to 3 fields: ") && toml.contains("# measured: "), "{toml}");
     let report: serde_json::Value = serde_json::from_slice(&fs::read(bench.path("mine.json")).unwrap()).unwrap();
@@ -31,16 +31,16 @@ fn the_recipe_that_is_found_makes_fields() {
     bench.good("generate mine.toml --out fields --frames 1 --quiet");
     assert_eq!(bench.files("fields").keys().filter(|name| name.starts_with("images/")).count(), 1);
 
-    // Its own older files are replaced, others are not.
+    // Older outputs are replaced, other files are not.
     fs::write(bench.path("mine.toml"), "# Matched to nothing\n").unwrap();
     fs::write(bench.path("notes.json"), "{}").unwrap();
-    let outcome = bench.run("match real --out mine.toml --report notes.json --budget 60");
+    let outcome = bench.run("match real --out mine.toml --report notes.json --simulations 60");
     assert!(outcome.code != 0 && outcome.err.contains("notes.json"), "{}", outcome.err);
     assert_eq!(fs::read_to_string(bench.path("notes.json")).unwrap(), "{}");
 }
 
 #[test]
-fn what_cannot_be_matched_is_refused_at_once() {
+fn invalid_input_of_a_match_is_rejected_at_once() {
     let bench = Bench::new("match-refuses");
     for folder in ["empty", "tiny", "constant", "noise", "text", "two"] {
         fs::create_dir_all(bench.path(folder)).unwrap();
@@ -62,13 +62,13 @@ fn what_cannot_be_matched_is_refused_at_once() {
         ("match two --pixel-um 0.33 --out a.toml", "120 x 160"),
         ("match noise --out a.toml", "--pixel-um"),
         ("match noise --pixel-um 0.33 --out taken.toml", "taken.toml"),
-        ("match noise --pixel-um 0.33 --out two", "this is a folder"),
+        ("match noise --pixel-um 0.33 --out two", "is a folder"),
         ("match noise --pixel-um 0.33 --out taken.toml/a.toml", "taken.toml"),
         ("match noise --pixel-um 0.33 --out a.toml --report a.toml", "--report a.toml"),
-        ("match noise --pixel-um 0.33 --group N --out a.toml", "no field is of group N"),
+        ("match noise --pixel-um 0.33 --group N --out a.toml", "no field of group N"),
         ("match noise --pixel-um 9 --out a.toml", "micrometres"),
-        ("match noise --pixel-um 0.33 --budget 3 --out a.toml", "windows"),
-        ("match noise --pixel-um 0.33 --budget 60 --quick --out a.toml", "--quick"),
+        ("match noise --pixel-um 0.33 --simulations 3 --out a.toml", "expected an integer from 60 to"),
+        ("match noise --pixel-um 0.33 --simulations 60 --quick --out a.toml", "--quick"),
     ] {
         let outcome = bench.run(words);
         assert!(outcome.code != 0 && outcome.out.is_empty(), "{words}: {}", outcome.out);

@@ -1,36 +1,35 @@
-//! Data sets from outside: shares, schedulers, kills, conversion, verification.
+//! Data sets: tasks, schedulers, killed runs, conversion, verification.
 
-#[allow(dead_code, reason = "each test uses its part")]
+#[allow(dead_code, reason = "each test uses a part")]
 use std::fs;
 use std::io::{BufRead, BufReader};
 
 use crate::support::{Bench, TINY};
 
-/// What `papsynth verify` prints of a whole data set after `root`.
+/// The root hash that `papsynth verify` prints.
 fn root(bench: &Bench, folder: &str, frames: u64) -> String {
     let run = bench.good(&format!("verify {folder} --frames {frames}"));
-    run.out.lines().find_map(|line| line.strip_prefix("root ")).expect("a whole data set has a root").to_owned()
+    run.out.lines().find_map(|line| line.strip_prefix("root ")).expect("a complete data set has a root").to_owned()
 }
 
 #[test]
-fn shares_make_what_one_run_makes_and_merging_fails_on_any_gap() {
+fn tasks_write_the_files_of_one_run_and_merge_requires_all_shards() {
     let bench = Bench::new("shares");
     let frames = format!("--frames 7 --format webdataset,cellpose --frames-per-shard 2 {TINY}");
     bench.good(&format!("generate --out one {frames}"));
     let whole = root(&bench, "one", 7);
-    for share in ["3/4", "0/4", "2/4"] {
-        let run = bench.good(&format!("generate --out parts {frames} --shard {share}"));
-        assert!(run.out.contains("papsynth merge parts"), "{}", run.out);
+    for task in ["3/4", "0/4", "2/4"] {
+        let run = bench.good(&format!("generate --out parts {frames} --task {task}"));
+        assert!(run.out.contains("papsynth merge parts --frames 7"), "{}", run.out);
     }
     let run = bench.run("merge parts --frames 7");
     assert!(run.code == 2 && run.err.contains("1 shard is missing or damaged: 1"), "{}", run.err);
     assert_eq!(bench.good("status parts --frames 7 --missing").out, "1\n");
     assert_eq!(bench.good("status parts --frames 7 --missing --tasks 4").out, "1\n");
-    assert!(bench.good("status parts --frames 7").out.contains("3 of 4 shards are whole (75.0 %)"));
-    let run =
-        bench.run_with(&format!("generate --out parts {frames} --shard auto/4"), &[("JOB_COMPLETION_INDEX", "1")]);
+    assert!(bench.good("status parts --frames 7").out.contains("3 of 4 shards present (75.0 %)"));
+    let run = bench.run_with(&format!("generate --out parts {frames} --task auto/4"), &[("JOB_COMPLETION_INDEX", "1")]);
     assert_eq!(run.code, 0, "{}", run.err);
-    // A change that keeps the size is found by reading alone.
+    // This change does not change the size.
     let path = bench.path("parts/webdataset/000000.tar");
     let good = fs::read(&path).unwrap();
     let mut bytes = good.clone();
@@ -40,15 +39,15 @@ fn shares_make_what_one_run_makes_and_merging_fails_on_any_gap() {
     assert!(run.code == 2 && run.err.contains("1 shard is missing or damaged: 0"), "{}", run.err);
     fs::write(&path, &good).unwrap();
     bench.good("merge parts --frames 7 --verify");
-    assert!(bench.good("status parts --frames 7").out.ends_with("it is closed\n"));
+    assert!(bench.good("status parts --frames 7").out.ends_with("finished\n"));
     assert_eq!(root(&bench, "parts", 7), whole);
     assert_eq!(bench.files("one"), bench.files("parts"));
-    let run = bench.run(&format!("generate --out parts {frames} --shard auto"));
+    let run = bench.run(&format!("generate --out parts {frames} --task auto"));
     assert!(run.code == 2 && run.err.contains("SLURM_ARRAY_TASK_ID"), "{}", run.err);
 }
 
 #[test]
-fn four_writers_on_the_same_shards_do_no_harm() {
+fn four_processes_may_write_the_same_shards() {
     let bench = Bench::new("writers");
     let frames = format!("--frames 6 --format folder,webdataset --frames-per-shard 2 {TINY}");
     bench.good(&format!("generate --out one {frames}"));
@@ -60,13 +59,13 @@ fn four_writers_on_the_same_shards_do_no_harm() {
     assert_eq!(root(&bench, "four", 6), root(&bench, "one", 6));
 }
 
-/// Kills at random moments of the whole run, 15 or as many as `PAPSYNTH_KILLS` says: nothing is lost, corrupt or there twice.
+/// Kills runs at random times, 15 or `PAPSYNTH_KILLS` times: no file is lost, corrupt or duplicated.
 #[cfg(unix)]
 #[test]
-fn whatever_is_killed_is_completed_by_the_next_run() {
+fn the_next_run_completes_a_killed_run() {
     let bench = Bench::new("kills");
     let frames = format!("--quiet --threads 2 --frames 6 --format folder,webdataset --frames-per-shard 2 {TINY}");
-    #[expect(clippy::disallowed_methods, reason = "moments of a run are spread over as long as it takes here")]
+    #[expect(clippy::disallowed_methods, reason = "times of kills depend on the duration of a run")]
     let start = std::time::Instant::now();
     bench.good(&format!("generate --out whole {frames}"));
     let whole = u64::try_from(start.elapsed().as_micros()).unwrap();
@@ -86,9 +85,9 @@ fn whatever_is_killed_is_completed_by_the_next_run() {
             if ended.is_some_and(|status| status.success()) {
                 break;
             }
-            assert!(ended.is_none(), "a run that is not killed succeeds");
+            assert!(ended.is_none(), "a run succeeds unless it is killed");
             killed += 1;
-            // Every file that has its name is whole; the folder itself may not be there yet.
+            // Every file with its final name is complete; the folder may not exist yet.
             let left = if bench.path("out").exists() { bench.files("out") } else { Default::default() };
             for (name, bytes) in left {
                 let good = fs::read(bench.path("whole").join(&name));
@@ -108,10 +107,10 @@ fn whatever_is_killed_is_completed_by_the_next_run() {
     eprintln!("{killed} kills in {rounds} rounds");
 }
 
-/// A disk that is full for real, made of memory; `cargo test -- --nocapture` says where none can be made.
+/// A full disk in memory; skipped where the system does not allow to mount one.
 #[test]
 #[cfg(target_os = "linux")]
-fn a_full_disk_leaves_nothing_partial_and_the_run_goes_on_when_there_is_room() {
+fn a_full_disk_leaves_no_partial_files_and_the_run_continues_when_there_is_space() {
     const SCRIPT: &str = r#"
         program=$1; shift
         mkdir disk && mount -t tmpfs -o size=160k tmpfs disk || { echo 'no disk'; exit 0; }
@@ -133,7 +132,7 @@ fn a_full_disk_leaves_nothing_partial_and_the_run_goes_on_when_there_is_room() {
         let words = format!("--quiet --threads 2 --frames 6 --format {format} {TINY}");
         bench.good(&format!("generate --out whole {words}"));
         let Some(said) = bench.script_as_root(SCRIPT, &words).filter(|said| !said.contains("no disk")) else {
-            eprintln!("left out: this system lets nobody mount a small disk");
+            eprintln!("skipped: this system does not allow to mount a small disk");
             return;
         };
         assert!(said.contains("first 74\n"), "{said}");
@@ -148,7 +147,7 @@ fn a_full_disk_leaves_nothing_partial_and_the_run_goes_on_when_there_is_room() {
 }
 
 #[test]
-fn damage_is_told_and_mended() {
+fn damage_is_found_and_repaired() {
     let bench = Bench::new("mend");
     let command = format!("generate --out out --frames 3 {TINY}");
     bench.good(&command);
@@ -164,50 +163,50 @@ fn damage_is_told_and_mended() {
     assert_eq!(verdict["findings"][0]["path"], "labels/nucleus/000001.tif");
     assert_eq!(verdict["findings"][1]["mend"], "clean");
     bench.good(&format!("{command} --verify"));
-    bench.good("clean out --strays");
+    bench.good("clean out --untracked");
     assert_eq!(bench.files("out"), before);
     root(&bench, "out", 3);
 }
 
 #[test]
-fn conversion_keeps_everything_but_the_format() {
+fn conversion_changes_only_the_format() {
     let bench = Bench::new("convert");
     bench.good(&format!("generate --out out --frames 3 {TINY}"));
     bench.good(&format!("generate --out direct --frames 3 --format stardist,qupath --flatten drop {TINY}"));
     bench.good("convert out --out converted --format qupath,stardist --flatten drop");
     assert_eq!(bench.files("direct"), bench.files("converted"));
     let run = bench.run("convert out --out converted --format yolo-seg");
-    assert!(run.code == 2 && run.err.contains("lies in files in another way"), "{}", run.err);
+    assert!(run.code == 2 && run.err.contains("was written with another layout"), "{}", run.err);
     assert_eq!(bench.run("convert out --out other").code, 2);
     assert_eq!(bench.run("convert none --out other --format cellpose").code, 2);
 }
 
 #[test]
 #[cfg(not(feature = "zarr"))]
-fn a_format_of_another_build_is_refused_before_anything_is_written() {
+fn a_format_of_another_build_is_rejected_before_a_file_is_written() {
     let bench = Bench::new("another-build");
     let run = bench.run("generate --out out --frames 1 --format folder,ome-zarr");
     assert!(run.code == 2 && run.err.contains("needs a build of papsynth with `--features zarr`"), "{}", run.err);
     assert!(!bench.path("out").exists());
-    assert!(bench.good("generate --help").out.contains("wants a build with --features zarr"));
+    assert!(bench.good("generate --help").out.contains("needs a build with --features zarr"));
 }
 
 #[test]
 #[cfg(not(feature = "parquet"))]
-fn parquet_of_another_build_is_refused_before_anything_is_written() {
+fn parquet_of_another_build_is_rejected_before_a_file_is_written() {
     let bench = Bench::new("without-parquet");
     let run = bench.run("generate --out out --frames 1 --format huggingface");
     assert!(run.code == 2 && run.err.contains("needs a build of papsynth with `--features parquet`"), "{}", run.err);
     assert!(!bench.path("out").exists());
-    // Lines of the help break anywhere.
+    // Help lines are wrapped.
     let help = bench.good("generate --help").out;
     let words: Vec<&str> = help.split_whitespace().collect();
-    assert!(words.join(" ").contains("(wants a build with --features parquet)"), "{help}");
+    assert!(words.join(" ").contains("(needs a build with --features parquet)"), "{help}");
 }
 
 #[test]
 #[cfg(feature = "zarr")]
-fn groups_of_zarr_are_made_verified_and_converted() {
+fn zarr_groups_are_written_verified_and_converted() {
     let bench = Bench::new("zarr");
     bench.good(&format!("generate --out out --frames 2 {TINY}"));
     bench.good(&format!("generate --out direct --frames 2 --format ome-zarr {TINY}"));
@@ -226,28 +225,28 @@ fn groups_of_zarr_are_made_verified_and_converted() {
 }
 
 #[test]
-fn scenes_are_imaged_again_and_their_truth_stays() {
+fn rerender_changes_images_but_not_ground_truth() {
     let bench = Bench::new("rerender");
     bench.good(&format!("generate --out out --range 2..5 {TINY}"));
     let soft = bench
         .good("rerender out --out soft --set optics.extra_blur_um=0.8 --set stain.slide_nucleus=0.5 --camera scmos");
-    assert!(soft.out.contains("3 frames made"), "{}", soft.out);
+    assert!(soft.out.contains("3 frames written"), "{}", soft.out);
     let (before, after) = (bench.files("out"), bench.files("soft"));
     for name in ["labels/nucleus/000002.tif", "labels/cytoplasm/000004.tif", "labels/layers/000003.tif"] {
         assert_eq!(before[name], after[name], "{name}");
     }
     assert_ne!(before["images/000002.png"], after["images/000002.png"]);
     let same = bench.good("rerender out --out same");
-    assert!(same.out.contains("3 frames made"), "{}", same.out);
+    assert!(same.out.contains("3 frames written"), "{}", same.out);
     assert_eq!(bench.files("same"), before);
     let run = bench.run("rerender out --out other --set cells.intermediate.count=9");
-    assert!(run.code == 2 && run.err.contains("`cells` says what lies in a scene"), "{}", run.err);
+    assert!(run.code == 2 && run.err.contains("`cells` changes the objects of a scene"), "{}", run.err);
     let run = bench.run("rerender out --out finer --set optics.oversampling=3");
-    assert!(run.code == 0 || run.err.contains("the truth is another"), "{}", run.err);
+    assert!(run.code == 0 || run.err.contains("the ground truth differs"), "{}", run.err);
 }
 
 #[test]
-fn nothing_of_anybody_else_is_replaced() {
+fn files_of_others_are_not_replaced() {
     let bench = Bench::new("others");
     fs::write(bench.path("recipe.toml"), "mine").unwrap();
     let tile = format!("slide tile --at 0,0 --size 64,64 --out recipe.toml {TINY}");
@@ -279,22 +278,22 @@ fn nothing_of_anybody_else_is_replaced() {
         let run = bench.run(&format!("{sweep} links {TINY}"));
         assert!(run.code == 2 && run.err.contains("0000"), "{}", run.err);
         assert!(bench.files("elsewhere").is_empty());
-        // Trying again would not help: no code 74.
+        // The same command fails again, so the exit code is 2.
         std::os::unix::fs::symlink(bench.path("nowhere"), bench.path("dangling")).unwrap();
         let run = bench.run(&format!("generate --out dangling --frames 1 {TINY}"));
         assert!(run.code == 2 && run.err.contains("dangling"), "{}", run.err);
     }
     let run =
         bench.run(&format!("sweep --out twice --frames 1 --vary focus.centre_um=1 --vary focus.centre_um=3,4 {TINY}"));
-    assert!(run.code == 2 && run.err.contains("varied already") && !bench.path("twice").exists(), "{}", run.err);
+    assert!(run.code == 2 && run.err.contains("given twice") && !bench.path("twice").exists(), "{}", run.err);
     let run = bench.run(&format!("sweep --out equal --frames 1 --vary focus.centre_um=1,1 {TINY}"));
-    assert!(run.code == 2 && run.err.contains("twice") && !bench.path("equal").exists(), "{}", run.err);
+    assert!(run.code == 2 && run.err.contains("occurs twice") && !bench.path("equal").exists(), "{}", run.err);
     let run = bench.run(&format!("generate --out range --range 1..3 --frames-per-shard 2 {TINY}"));
     assert!(run.code == 2 && run.err.contains("multiple of 2") && !bench.path("range").exists(), "{}", run.err);
 }
 
 #[test]
-fn numbers_of_frames_take_no_memory() {
+fn large_numbers_of_frames_need_no_memory() {
     let bench = Bench::new("vast");
     bench.good(&format!("generate --out out --frames 1 {TINY}"));
     let most = u64::MAX;
@@ -304,9 +303,9 @@ fn numbers_of_frames_take_no_memory() {
     assert_eq!((run.code, run.out.trim()), (0, "0-2"), "{}", run.err);
     let run = bench.run_within(500_000, &format!("merge out --frames {most}"));
     assert!(run.code == 2 && run.err.contains("shards are missing"), "{}", run.err);
-    // It begins, and makes frame after frame until it is stopped.
+    // The run starts without delay.
     let words = format!("generate --json --threads 1 --out many --format folder --frames {most} {TINY}");
-    let mut child = bench.spawn_heard(&words);
+    let mut child = bench.spawn_piped(&words);
     let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
     assert!(lines.nth(2).unwrap().unwrap().contains("\"done\":2"));
     child.kill().unwrap();
@@ -314,7 +313,7 @@ fn numbers_of_frames_take_no_memory() {
 }
 
 #[test]
-fn a_sweep_makes_every_combination_and_one_table() {
+fn a_sweep_writes_every_combination_and_one_table() {
     let bench = Bench::new("sweep");
     let vary = "--vary camera.full_well_e=2000,18000 --vary debris.speckles.count=0,9,30";
     bench.good(&format!("sweep --out sweep --frames 2 {vary} {TINY}"));
@@ -324,7 +323,7 @@ fn a_sweep_makes_every_combination_and_one_table() {
     assert_eq!(lines[0], "set,image,slide,file,camera.full_well_e,debris.speckles.count");
     assert_eq!(lines[12], "0005,1,0,images/000001.png,18000,30");
     let files = bench.files("sweep");
-    // Cells do not depend on specks, nor masks on the camera.
+    // Cells do not depend on speckles, and masks do not depend on the camera.
     assert_eq!(files["0000/labels/nucleus/000001.tif"], files["0005/labels/nucleus/000001.tif"]);
     assert_eq!(files["0002/labels/debris/000001.tif"], files["0005/labels/debris/000001.tif"]);
     assert_ne!(files["0000/images/000001.png"], files["0003/images/000001.png"]);
@@ -333,38 +332,38 @@ fn a_sweep_makes_every_combination_and_one_table() {
 }
 
 #[test]
-fn a_plan_tells_time_bytes_and_shards() {
+fn a_plan_estimates_time_size_and_shards() {
     let bench = Bench::new("plan");
     let run = bench.good(&format!("plan --frames 100000 --samples 3 --tasks 10 --per-core-hour 0.05 {TINY}"));
-    for part in ["391 shards of 256", "core hours", "10 x", "price", "webdataset", "on disk"] {
+    for part in ["391 shards", "core hours", "10 tasks", "price", "webdataset", "on disk"] {
         assert!(run.out.contains(part), "{part}: {}", run.out);
     }
-    assert!(bench.files("").is_empty(), "nothing is left");
+    assert!(bench.files("").is_empty(), "no file remains");
 }
 
 #[test]
-fn what_tasks_would_miss_is_said_before() {
+fn submit_reports_errors_of_the_tasks() {
     let bench = Bench::new("submit-here");
     let submit = |words: &str| bench.run(&format!("submit {words} --frames 30"));
     let run = submit("slurm --tasks 2 -- generate --out x");
-    assert!(run.code == 2 && run.err.contains("leave it out"), "{}", run.err);
+    assert!(run.code == 2 && run.err.contains("give only the arguments of `papsynth generate`"), "{}", run.err);
     let run = submit("slurm --tasks 2 -- --out x --set a.b=1");
     assert!(run.code == 2 && run.err.contains("a.b"), "{}", run.err);
     let run = submit("slurm --tasks 2 -- there.toml --out x");
     assert!(run.code == 0 && run.err.contains("there.toml is not on this machine"), "{}", run.err);
     let pod = |out: &str| submit(&format!("kubernetes --tasks 2 --image i -- --out {out}"));
     let run = pod("many");
-    assert!(run.code == 0 && run.err.contains("many lies in the pod"), "{}", run.err);
+    assert!(run.code == 0 && run.err.contains("many is inside the pod"), "{}", run.err);
     for out in ["/data/many", "s3://bucket/many"] {
         assert_eq!(pod(out).err, "", "{out}");
     }
 }
 
 #[test]
-fn scripts_are_printed_and_what_tasks_would_refuse_is_refused() {
+fn submit_prints_scripts_and_rejects_invalid_arguments() {
     let bench = Bench::new("submit");
     let run = bench.good("submit slurm --tasks 4 --threads 2 -- --out many --frames 2000 --format webdataset");
-    for part in ["--array=0-3", "--shard auto/4", "--cpus-per-task=2", "generate --out many --frames 2000"] {
+    for part in ["--array=0-3", "--task auto/4", "--cpus-per-task=2", "generate --out many --frames 2000"] {
         assert!(run.out.contains(part), "{part}: {}", run.out);
     }
     let run = bench.good("submit kubernetes --tasks 4 --image papsynth:1 -- --out /data/many --frames 2000");
@@ -373,7 +372,7 @@ fn scripts_are_printed_and_what_tasks_would_refuse_is_refused() {
     }
     for wrong in [
         "submit slurm --tasks 4 -- --out many --frams 2000",
-        "submit slurm --tasks 4 -- --out many --frames 2000 --shard 0/4",
+        "submit slurm --tasks 4 -- --out many --frames 2000 --task 0/4",
         "submit slurm --tasks 9 -- --out many --frames 1000 --format webdataset",
         "submit kubernetes --tasks 4 -- --out many --frames 2000",
     ] {

@@ -1,9 +1,9 @@
-//! `papsynth study` from outside.
+//! `papsynth study`.
 
-#[allow(dead_code, reason = "each test uses its part")]
+#[allow(dead_code, reason = "each test uses a part")]
 use crate::support::Bench;
 
-/// Folders of small pictures with dark squares on glass.
+/// Folders of small images with dark squares on a bright background.
 fn bench(name: &str) -> Bench {
     let bench = Bench::new(name);
     for (side, glass) in [("real", 200), ("synthetic", 230)] {
@@ -20,13 +20,13 @@ fn bench(name: &str) -> Bench {
 const SMALL: &str = "--trials 4 --patch-px 64";
 
 #[test]
-fn what_cannot_be_studied_is_refused_with_code_2() {
+fn invalid_input_of_a_study_has_exit_code_2() {
     let bench = bench("study-refused");
     for (words, named) in [
         ("study", "REAL"),
         ("study real", "SYNTHETIC"),
         ("study real missing", "missing"),
-        ("study real real/0.png", "a folder of pictures"),
+        ("study real real/0.png", "a folder of images"),
         ("study real synthetic --subject ../other", "subject: `../other`"),
         ("study real synthetic --subject x", "subject: `x`"),
         ("study real synthetic --trials 0", "trials: 0"),
@@ -37,7 +37,7 @@ fn what_cannot_be_studied_is_refused_with_code_2() {
         ("study real synthetic --port 0", "--port"),
         ("study real synthetic --json", "cannot be used with"),
         ("study --json", "--results"),
-        ("study real synthetic --patch-px 300", "real: 3 fields give 0 patches"),
+        ("study real synthetic --patch-px 300", "real: found 0 of "),
         ("study real synthetic --trials 10000 --patch-px 64", "are needed"),
         ("study --results real", "there is no study in it"),
         ("study --results missing", "missing"),
@@ -52,7 +52,7 @@ fn what_cannot_be_studied_is_refused_with_code_2() {
 
 #[cfg(unix)]
 #[test]
-fn it_says_where_the_page_is_and_goes_on_after_an_interrupt() {
+fn a_study_prints_its_address_and_continues_after_an_interrupt() {
     let bench = bench("study-interrupt");
     let first = bench.interrupt_after_first_line(&format!("study real synthetic {SMALL}"));
     assert_eq!(first.code, 130, "{}", first.err);
@@ -64,7 +64,7 @@ fn it_says_where_the_page_is_and_goes_on_after_an_interrupt() {
     );
     let address = |text: &str| text.split_whitespace().find(|word| word.starts_with("http:")).map(str::to_owned);
     let second = bench.interrupt_after_first_line(&format!("study real synthetic {SMALL}"));
-    assert_eq!(address(&first.out), address(&second.out), "an open page finds its server again");
+    assert_eq!(address(&first.out), address(&second.out), "an open page reconnects");
     let other = bench.run("study real synthetic --trials 6 --patch-px 64");
     assert_eq!(other.code, 2);
     assert!(other.err.contains("trials was 4 and is 6 now"), "{}", other.err);

@@ -1,12 +1,12 @@
-//! `papsynth view` from outside.
+//! `papsynth view`.
 
-#[allow(dead_code, reason = "each test uses its part")]
+#[allow(dead_code, reason = "each test uses a part")]
 use std::fs;
 
 use crate::support::{Bench, TINY};
 
 #[test]
-fn what_cannot_be_shown_is_refused_with_code_2() {
+fn invalid_input_of_a_view_has_exit_code_2() {
     let bench = Bench::new("view-refused");
     fs::create_dir(bench.path("empty")).unwrap();
     fs::create_dir(bench.path("slide")).unwrap();
@@ -27,14 +27,14 @@ fn what_cannot_be_shown_is_refused_with_code_2() {
 
 #[cfg(unix)]
 #[test]
-fn it_serves_until_it_is_asked_to_end() {
+fn the_server_runs_until_ctrl_c() {
     use std::io::{BufRead, BufReader, Read, Write};
     use std::net::TcpStream;
     use std::process::Command;
 
     let bench = Bench::new("view-serves");
     bench.good(&format!("generate --out set --frames 2 {TINY}"));
-    let mut child = bench.spawn_heard("view set");
+    let mut child = bench.spawn_piped("view set");
     let mut out = BufReader::new(child.stdout.take().unwrap());
     let mut text = String::new();
     (0..2).for_each(|_| assert!(out.read_line(&mut text).unwrap() > 0));

@@ -1,4 +1,4 @@
-//! Running the program in a folder of its own.
+//! Runs the program in a temporary folder.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -7,17 +7,17 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::SystemTime;
 
-/// A field that is made in a moment.
+/// Options of a small, fast field.
 pub(crate) const TINY: &str = "--set field.width_px=96 --set field.height_px=80 --set layout.kind=uniform \
     --set cells.intermediate.count=2 --set cells.superficial.count=0 --set cells.parabasal.count=0 --set cells.metaplastic.count=0 --set debris.leukocytes.clusters=1 \
     --set debris.bacilli.clusters=1 --set debris.speckles.count=3 --set debris.out_of_focus.count=0";
 
-/// A folder that is removed afterwards.
+/// A temporary folder, removed on drop.
 pub(crate) struct Bench {
     root: PathBuf,
 }
 
-/// What a run of the program left.
+/// Exit code, standard output and standard error of a run.
 pub(crate) struct Outcome {
     pub(crate) code: i32,
     pub(crate) out: String,
@@ -29,7 +29,7 @@ impl Bench {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
         fs::create_dir_all(folder).unwrap();
         let path = |n: u32| folder.join(format!("{name}-{}-{n}", std::process::id()));
-        // Tests that run beside each other may use the same name.
+        // Tests in parallel may use the same name.
         Self { root: (0..).map(path).find(|path| fs::create_dir(path).is_ok()).unwrap() }
     }
 
@@ -51,7 +51,7 @@ impl Bench {
         Outcome { code: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
     }
 
-    /// A run that may ask the system for so many kilobytes in all, where the system can be told to refuse more.
+    /// A run with an address-space limit in kilobytes, on Linux.
     pub(crate) fn run_within(&self, kilobytes: u64, words: &str) -> Outcome {
         if !cfg!(target_os = "linux") {
             return self.run(words);
@@ -64,8 +64,8 @@ impl Bench {
         Outcome { code: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
     }
 
-    /// What a shell script prints that may mount in a world of its own; the program is its first argument, then `words`. Nothing where nobody
-    /// may.
+    /// The output of a shell script that may mount disks. Its arguments are the program and `words`. `None` where the
+    /// system does not allow it.
     pub(crate) fn script_as_root(&self, script: &str, words: &str) -> Option<String> {
         let mut command = Command::new("unshare");
         command.args(["--map-root-user", "--mount", "sh", "-c", script, "sh", env!("CARGO_BIN_EXE_papsynth")]);
@@ -74,20 +74,20 @@ impl Bench {
         output.status.success().then(|| String::from_utf8(output.stdout).unwrap())
     }
 
-    /// A run with variables of the environment.
+    /// A run with environment variables.
     pub(crate) fn run_with(&self, words: &str, variables: &[(&str, &str)]) -> Outcome {
         let output = self.command(words).envs(variables.iter().copied()).output().unwrap();
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
         Outcome { code: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
     }
 
-    /// A run that goes on beside the test.
+    /// A run in the background.
     pub(crate) fn spawn(&self, words: &str) -> std::process::Child {
         self.command(words).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
     }
 
-    /// A run that goes on beside the test, and whose standard output is read.
-    pub(crate) fn spawn_heard(&self, words: &str) -> std::process::Child {
+    /// A run in the background with a pipe for standard output.
+    pub(crate) fn spawn_piped(&self, words: &str) -> std::process::Child {
         self.command(words).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap()
     }
 
@@ -98,14 +98,14 @@ impl Bench {
         outcome
     }
 
-    /// The exit code of a run whose standard output nobody reads.
+    /// The exit code of a run with a closed standard output.
     pub(crate) fn run_into_closed_pipe(&self, words: &str) -> Option<i32> {
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);
         self.command(words).stdout(writer).stderr(Stdio::null()).status().unwrap().code()
     }
 
-    /// Interrupts a run as Ctrl-C does once it has said something.
+    /// Interrupts a run, like Ctrl-C, after two lines of output.
     #[cfg(unix)]
     pub(crate) fn interrupt_after_first_line(&self, words: &str) -> Outcome {
         let mut child = self.command(words).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
@@ -170,7 +170,7 @@ impl Drop for Bench {
     }
 }
 
-/// Outlines as a table: circles with lobes, each a little different.
+/// A table of outlines: circles with different lobes.
 pub(crate) fn outlines(count: usize, points: usize, radius_px: f64) -> String {
     let mut text = String::from("outline,k,x_px,y_px\n");
     for outline in 0..count {
@@ -184,7 +184,7 @@ pub(crate) fn outlines(count: usize, points: usize, radius_px: f64) -> String {
     text
 }
 
-/// A sine good to a thousandth of a pixel, by its series.
+/// A sine by its series, exact to a thousandth of a pixel.
 fn sine(angle: f64) -> f64 {
     let turns = (angle / std::f64::consts::TAU).round();
     let x = angle - turns * std::f64::consts::TAU;

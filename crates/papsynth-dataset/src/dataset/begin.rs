@@ -1,4 +1,4 @@
-//! Data sets begun and resumed.
+//! Creation and resumption of data sets.
 
 use std::sync::Arc;
 
@@ -7,88 +7,91 @@ use papsynth::recipe::Recipe;
 
 use super::manifest::Manifest;
 use super::merge::{begin_manifest, write_manifest};
+use super::occupied::{any_content, recipe_difference, refuse_nested};
 use super::record::{Identity, read_record, recorded_shards};
 use super::set::Dataset;
-use super::taken::{recipe_difference, refuse_nested, stranger};
 use crate::error::Error;
-use crate::files::{Folder, Home};
+use crate::files::{Folder, Location};
 use crate::formats::{Layout, names};
 use crate::read::InputFile;
 use crate::truth::{Category, categories};
 
-/// What a data set is made from.
+/// The inputs of a data set.
 #[derive(Debug, Clone, Copy)]
 pub struct DatasetInfo<'a> {
-    /// The recipe, resolved: as the engine got it.
+    /// The resolved recipe: the one of the engine.
     pub recipe: &'a Recipe,
     /// The model.
     pub model: &'a Model,
     /// The seed.
     pub seed: u64,
-    /// The map that the recipe names, if it names one: kept in the data set, so that it can be made again from there.
+    /// The map that the recipe names, if any. The data set stores a copy.
     pub map: Option<&'a InputFile>,
-    /// How it lies in files.
+    /// The layout of the files.
     pub layout: &'a Layout,
 }
 
 impl Dataset {
-    /// Begins a data set in a folder that is empty or not there yet, or goes on with the one in it.
+    /// Creates a data set in a new or empty folder, or resumes the one in the folder.
     ///
     /// # Errors
-    /// If the folder holds something else, or a data set of another recipe, model, seed or stream version (the message
-    /// says which), or the system refuses.
-    pub fn create_or_resume(home: impl Into<Home>, info: &DatasetInfo) -> Result<Self, Error> {
+    /// If the folder contains other files or a data set with another recipe, model, seed, stream version or layout (the
+    /// message states the difference), or cannot be written.
+    pub fn create_or_resume(location: impl Into<Location>, info: &DatasetInfo) -> Result<Self, Error> {
         let (identity, recipe, model) = Identity::of(info.recipe, info.model, info.seed);
         let map = info.map.map(|file| file.name.clone());
-        let kept = info.map.map(|file| (file.name.clone(), file.bytes.to_vec()));
+        let copy = info.map.map(|file| (file.name.clone(), file.bytes.to_vec()));
         let given = [(names::RECIPE, recipe.into_bytes()), (names::MODEL, model.into_bytes())];
-        let given = given.map(|(name, bytes)| (name.to_owned(), bytes)).into_iter().chain(kept).collect::<Vec<_>>();
-        Self::begin(home, identity, info.layout.clone(), categories(info.recipe), map, &given)
+        let given = given.map(|(name, bytes)| (name.to_owned(), bytes)).into_iter().chain(copy).collect::<Vec<_>>();
+        Self::begin(location, identity, info.layout.clone(), categories(info.recipe), map, &given)
     }
 
-    /// The same of what is decided already; `given` is kept in the folder, the recipe first.
+    /// As [`create_or_resume`](Self::create_or_resume), with the identity and the input files `given`, the recipe
+    /// first.
     pub(crate) fn begin(
-        home: impl Into<Home>,
+        location: impl Into<Location>,
         identity: Identity,
         layout: Layout,
         categories: Vec<Category>,
         map: Option<String>,
         given: &[(String, Vec<u8>)],
     ) -> Result<Self, Error> {
-        let folder = Folder::new(home);
+        let folder = Folder::new(location);
         let path = &folder.shown();
         if path.as_os_str().is_empty() {
-            let message = "the folder of the data set has no name; `.` is this one".to_owned();
-            return Err(Error::folder(path, message));
+            return Err(Error::folder(path, "the path of the data set is empty; `.` is the current folder"));
         }
         if layout.formats.is_empty() || layout.frames_per_shard == 0 {
-            let message = "a data set wants at least one format, and one frame a shard".to_owned();
-            return Err(Error::folder(path, message));
+            return Err(Error::folder(path, "a data set needs at least 1 format and at least 1 frame a shard"));
         }
         if let Some((feature, what)) = layout.needs() {
             return Err(Error::missing_feature(&what, feature, path));
         }
         let dataset = Self { folder, identity, layout, categories, map, trusted: Arc::default() };
-        dataset.begun(given).map_err(|error| dataset.folder.named(error))?;
+        dataset.create_or_compare(given).map_err(|error| dataset.folder.named(error))?;
         Ok(dataset)
     }
 
-    fn begun(&self, given: &[(String, Vec<u8>)]) -> Result<(), Error> {
+    fn create_or_compare(&self, given: &[(String, Vec<u8>)]) -> Result<(), Error> {
         let recipe = given.first().map(|(_, bytes)| String::from_utf8_lossy(bytes)).unwrap_or_default();
-        let stranger = stranger(&self.folder)?;
-        if stranger.is_none() {
+        let content = any_content(&self.folder)?;
+        if content.is_none() {
             refuse_nested(&self.folder)?;
         }
-        match stranger {
-            // Of several that begin at once one is the first.
+        match content {
+            // If several processes start at once, one of them writes the manifest.
             None if begin_manifest(self)? => {}
             None => self.compare_or_restore(&recipe)?,
             Some(_) if self.folder.has(names::MANIFEST)? => self.compare_or_restore(&recipe)?,
             Some(_) if self.restore()? => {}
             Some(name) => {
                 let message = match recorded_shards(&self.folder)?.is_empty() {
-                    true => format!("the folder holds something else (`{name}`) and no data set; choose another, or a new one"),
-                    false => "its manifest.json is lost, and its shards are of another recipe, model, seed or layout; give what it was made from".to_owned(),
+                    true => format!("the folder contains `{name}` and no data set; choose a new or empty folder"),
+                    false => {
+                        "manifest.json is missing, and the shards have another recipe, model, seed or layout; use \
+                              the original ones"
+                            .to_owned()
+                    }
                 };
                 return Err(Error::folder(self.folder.root(), message));
             }
@@ -100,7 +103,7 @@ impl Dataset {
         Ok(())
     }
 
-    /// As [`compare`](Self::compare); where the manifest was damaged, the shards say what the data set is.
+    /// As [`compare`](Self::compare). If the manifest is damaged, compares the records of shards and restores it.
     fn compare_or_restore(&self, recipe: &str) -> Result<(), Error> {
         match self.compare(recipe) {
             Err(damaged @ Error::Input { .. }) => {
@@ -114,7 +117,7 @@ impl Dataset {
         }
     }
 
-    /// Writes the manifest anew if the shards that are recorded are of this data set.
+    /// Rewrites the manifest if a recorded shard belongs to this data set. Returns whether it did.
     fn restore(&self) -> Result<bool, Error> {
         for shard in recorded_shards(&self.folder)? {
             let Ok(record) = read_record(&self.folder, shard) else { continue };
@@ -126,26 +129,28 @@ impl Dataset {
         Ok(false)
     }
 
-    /// The data set that lies in the folder must be this one.
+    /// Checks that the folder contains this data set.
     fn compare(&self, recipe: &str) -> Result<(), Error> {
         let manifest = Manifest::read(&self.folder)?;
         let (there, here) = (manifest.identity, &self.identity);
         let difference = if there.stream_version != here.stream_version {
-            Some(format!("is of stream version {}, this program writes {}", there.stream_version, here.stream_version))
+            let (there, here) = (there.stream_version, here.stream_version);
+            Some((format!("has stream version {there}; this program writes {here}"), "use the release that wrote it"))
         } else if there.recipe_sha256 != here.recipe_sha256 {
-            Some(format!("is of another recipe{}", recipe_difference(&self.folder, recipe)))
+            let difference = recipe_difference(&self.folder, &there.recipe_sha256, recipe);
+            Some((format!("has another recipe{difference}"), "use its recipe.toml"))
         } else if there.model_sha256 != here.model_sha256 {
-            Some("is of another model".to_owned())
+            Some(("has another model".to_owned(), "use its model.json"))
         } else if there.seed != here.seed {
-            Some(format!("is of seed {}, not {}", there.seed, here.seed))
+            Some((format!("has seed {}, not {}", there.seed, here.seed), "use its seed"))
         } else if manifest.layout != self.layout {
-            Some(format!("lies in files in another way ({}, not {})", manifest.layout, self.layout))
+            let (there, here) = (manifest.layout, &self.layout);
+            Some((format!("was written with another layout ({there}), not {here}"), "use its layout"))
         } else {
             None
         };
-        difference.map_or(Ok(()), |difference| {
-            let message =
-                format!("the data set in this folder {difference}; choose another folder, or what it was made from");
+        difference.map_or(Ok(()), |(difference, remedy)| {
+            let message = format!("the data set in this folder {difference}; choose another folder, or {remedy}");
             Err(Error::folder(self.path(), message))
         })
     }

@@ -1,4 +1,4 @@
-//! What a data set says of itself: a card for people, Croissant for machines.
+//! The description of a data set: a card in Markdown, and Croissant metadata.
 
 use std::fmt::Write;
 
@@ -8,22 +8,22 @@ use super::set::{Dataset, Summary};
 use crate::files::FileRecord;
 use crate::formats::{Format, names};
 
-/// What the card says of images that no person made: <https://spdx.org/licenses/CC0-1.0.html>.
+/// Licence of the images: <https://spdx.org/licenses/CC0-1.0.html>.
 const LICENCE: &str = "https://creativecommons.org/publicdomain/zero/1.0/";
 
-const ABOUT: &str = "Synthetic bright-field microscope images of cervical smears with exact truth: complete (amodal) and visible masks of \
-                     every cell, nucleus and piece of debris, with class, place, depth and stain.";
+const ABOUT: &str = "Synthetic bright-field microscope images of cervical smears with exact ground truth: complete (amodal) and visible masks \
+                     of every cell, nucleus and piece of debris, with class, position, depth and absorbance.";
 
-/// The card, in Markdown with the head that Hugging Face reads; `writer` is the program that made the data set.
+/// Returns the card in Markdown, with the YAML header of Hugging Face. `writer` is the program that wrote the data set.
 pub(super) fn card(dataset: &Dataset, writer: &str, summary: &Summary) -> String {
     let identity = &dataset.identity;
     let formats = &dataset.layout.formats;
     let mut text = format!(
         "---\nlicense: cc0-1.0\ntask_categories:\n- image-segmentation\n- object-detection\ntags:\n- synthetic\n- cytology\n- \
-         microscopy\n---\n\n# Synthetic cervical smears\n\n{ABOUT}\n\n## How it was made\n\n\
+         microscopy\n---\n\n# Synthetic cervical smears\n\n{ABOUT}\n\n## Provenance\n\n\
          | | |\n|---|---|\n| program | {writer} |\n| recipe | `recipe.toml`, SHA-256 `{}` |\n| model | `model.json`, SHA-256 \
-         `{}` |\n| seed | {} |\n| version of streams | {} |\n| frames | {} |\n\nThe same recipe, model, seed and version of streams give \
-         the same pixels, labels and tables again:\n\n```sh\npapsynth generate recipe.toml --model model.json --seed {} \
+         `{}` |\n| seed | {} |\n| stream version | {} |\n| frames | {} |\n\nThe same recipe, model, seed and stream version give \
+         the same pixels, labels and tables:\n\n```sh\npapsynth generate recipe.toml --model model.json --seed {} \
          --frames N --out again\n```\n",
         identity.recipe_sha256,
         identity.model_sha256,
@@ -32,49 +32,60 @@ pub(super) fn card(dataset: &Dataset, writer: &str, summary: &Summary) -> String
         summary.frames,
         identity.seed,
     );
-    text.push_str("\n## What lies where\n\n| | |\n|---|---|\n");
+    text.push_str("\n## Files\n\n| | |\n|---|---|\n");
     let mut row = |what: &str, about: &str| {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "| `{what}` | {about} |");
     };
     for format in formats {
-        let place = if *format == Format::Folder { "images/, labels/, noise-free/" } else { format.name() };
+        let place = if *format == Format::Folder { "images/, preview/, labels/, noise-free/" } else { format.name() };
         row(place, format.about());
     }
-    row("shards/*.coco.json", "COCO, with amodal and visible masks and everything else that is known of every object");
-    row("objects/*.csv", "the same as a table, without masks");
+    row("shards/*.coco.json", "COCO with amodal and visible masks and all properties of every object");
+    row("objects/*.csv", "the properties of every object as a table, without masks");
     if dataset.layout.objects_parquet {
-        row("objects/*.parquet", "the same with types, and with amodal and visible masks as COCO's run lengths");
+        row("objects/*.parquet", "the same table with types, and with amodal and visible masks as COCO run lengths");
     }
     if dataset.layout.scenes {
-        row("scenes/", "the scene of each frame as JSON, which `papsynth render --scene` images");
+        row("scenes/", "the scene of each frame as JSON; `papsynth render --scene` renders it");
     }
-    row("splits.csv", "train, val and test, drawn by field and by slide (fields of a slide share stain and light)");
-    row("manifest.json, shards/*.json", "every file with its size and SHA-256; `papsynth verify` checks them");
+    row(
+        "splits.csv",
+        "train, val and test splits, by field and by slide (fields of a slide have the same stain and light)",
+    );
+    row("manifest.json, shards/*.json", "size and SHA-256 of every file; `papsynth verify` checks them");
     if formats.iter().any(|format| format.is_flat()) {
-        let lost: u64 = summary.lost_px.values().sum();
+        let lost: u64 = summary.occluded_px.values().sum();
         let policy = dataset.layout.flatten.name();
         let _ = writeln!(
             text,
-            "\nFormats with one label a pixel follow the policy `{policy}` where objects overlap; {lost} pixels of masks are not shown \
-             in them ({}).",
-            summary.lost_px.iter().map(|(group, px)| format!("{group} {px}")).collect::<Vec<_>>().join(", ")
+            "\nFormats with one label a pixel use the policy `{policy}` where objects overlap; they omit {lost} occluded mask \
+             pixels ({}).",
+            summary.occluded_px.iter().map(|(group, px)| format!("{group} {px}")).collect::<Vec<_>>().join(", ")
         );
     }
-    text.push_str("\n## What is in it\n\n| category | objects |\n|---|---|\n");
+    if !summary.empty_splits.is_empty() {
+        let empty = summary.empty_splits.join(" and ");
+        let _ = writeln!(
+            text,
+            "\nNo slide is in the split {empty}: the data set has too few slides for splits by slide. Generate more frames, set fewer \
+             fields per slide in the recipe, or use the splits by field in `splits.csv`."
+        );
+    }
+    text.push_str("\n## Objects\n\n| category | objects |\n|---|---|\n");
     for (category, count) in &summary.objects {
         let _ = writeln!(text, "| {category} | {count} |");
     }
     text.push_str(
-        "\n## Limits\n\nNo image shows a patient. Shapes and textures are drawn from statistics of real cells; what was not measured \
-         there is plausible and no more. Classes are told by their morphology in the recipe, not by a diagnosis. Results on these \
-         images say nothing about patients until they have been repeated on real ones.\n\n## Licence\n\nNobody claims rights in these images: \
-         CC0 1.0, unless whoever publishes them says otherwise.\n",
+        "\n## Limits\n\nNo image shows a patient. Shapes and textures are drawn from statistics of real cells; properties without \
+         measurements are plausible assumptions. Classes are defined by their morphology in the recipe, not by a diagnosis. \
+         Results on these images do not apply to patients until they are repeated on real images.\n\n## Licence\n\nThese images are in the public domain (CC0 1.0), unless their publisher states \
+         another licence.\n",
     );
     text
 }
 
-/// Croissant 1.0: <https://docs.mlcommons.org/croissant/docs/croissant-spec.html>.
+/// Returns the metadata in Croissant 1.0: <https://docs.mlcommons.org/croissant/docs/croissant-spec.html>.
 pub(super) fn croissant(dataset: &Dataset, files: &[FileRecord]) -> Value {
     let object = |file: &FileRecord| {
         let encoding = match file.path.rsplit('.').next() {
@@ -89,7 +100,7 @@ pub(super) fn croissant(dataset: &Dataset, files: &[FileRecord]) -> Value {
             "contentSize": format!("{} B", file.bytes), "encodingFormat": encoding, "sha256": file.sha256,
         })
     };
-    // Files of many frames, each a set of its own, of which every file is named with its SHA-256 above.
+    // One file set for each format with many frames in a file.
     let format_sets = dataset.layout.formats.iter().filter_map(|format| {
         let (includes, encoding) = match format {
             Format::Webdataset => ("webdataset/*.tar", "application/x-tar"),
@@ -99,8 +110,8 @@ pub(super) fn croissant(dataset: &Dataset, files: &[FileRecord]) -> Value {
         Some((format.name(), includes, encoding, format.about()))
     });
     let table_sets = [
-        (TABLES, "objects/*.csv", "text/csv", "tables of objects, one a shard"),
-        (PARQUET_TABLES, "objects/*.parquet", PARQUET, "tables of objects with masks, one a shard"),
+        (TABLES, "objects/*.csv", "text/csv", "tables of objects, one for each shard"),
+        (PARQUET_TABLES, "objects/*.parquet", PARQUET, "tables of objects with masks, one for each shard"),
     ];
     let table_sets = table_sets.into_iter().filter(|(set, ..)| *set == TABLES || dataset.layout.objects_parquet);
     let file_set = |(name, includes, encoding, about): (&str, &str, &str, &str)| {
@@ -118,12 +129,12 @@ pub(super) fn croissant(dataset: &Dataset, files: &[FileRecord]) -> Value {
         })
     };
     let mut sets = Vec::new();
-    // Where shards hold many frames there is no table of all objects but those of the shards.
+    // If shards have many frames, objects are only in the tables of the shards.
     let objects = if has(names::TABLE) { ("fileObject", names::TABLE) } else { ("fileSet", TABLES) };
     for (set, source, about, fields) in [
         ("objects", objects, "Every object and part of a cell.", OBJECTS),
-        ("splits", ("fileObject", names::SPLITS), "Which split each frame falls into.", SPLITS),
-        ("frames", ("fileSet", Format::Huggingface.name()), "Size, slide and place of each frame.", FRAMES),
+        ("splits", ("fileObject", names::SPLITS), "Split of each frame.", SPLITS),
+        ("frames", ("fileSet", Format::Huggingface.name()), "Size and slide of each frame.", FRAMES),
     ] {
         let (kind, name) = source;
         let is_there = match kind {
@@ -171,23 +182,23 @@ const OBJECTS: &[(&str, &str, &str)] = &[
     ("image", "sc:Integer", "index of the frame"),
     ("id", "sc:Integer", "id in the frame; nucleus and cytoplasm of a cell share it"),
     ("part", "sc:Text", "cytoplasm, nucleus or whole"),
-    ("kind", "sc:Text", "what kind of object it is"),
+    ("kind", "sc:Text", "kind of the object"),
     ("class", "sc:Text", "class of the cell, else the kind"),
     ("bethesda", "sc:Text", "Bethesda category of the class"),
     ("depth_um", "sc:Float", "depth in micrometres, positive towards the objective"),
-    ("stain", "sc:Float", "mean decadic absorbance"),
-    ("area_um2", "sc:Float", "area of the whole object in square micrometres"),
+    ("mean_absorbance", "sc:Float", "mean decadic absorbance"),
+    ("area_um2", "sc:Float", "area of the complete object in square micrometres"),
     ("area_px", "sc:Integer", "pixels of the complete mask"),
 ];
 
 const SPLITS: &[(&str, &str, &str)] = &[
     ("image", "sc:Integer", "index of the frame"),
     ("slide", "sc:Integer", "number of its slide"),
-    ("by_field", "sc:Text", "split of the frame by itself"),
-    ("by_slide", "sc:Text", "split of all frames of its slide"),
+    ("by_field", "sc:Text", "split of the frame by field"),
+    ("by_slide", "sc:Text", "split of the frame by slide"),
 ];
 
-/// The context that the standard prescribes.
+/// Returns the JSON-LD context of the standard.
 fn context() -> Value {
     json!({
         "@language": "en", "@vocab": "https://schema.org/", "citeAs": "cr:citeAs", "column": "cr:column",

@@ -1,4 +1,4 @@
-//! Data sets written anew in other formats: from their files, without an engine.
+//! Conversion of data sets into other formats, from their files, without an engine.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,23 +8,19 @@ use papsynth::Plane;
 use super::generate::{Outcome, Progress};
 use super::images::{images, pages};
 use super::record::ShardRecord;
-use super::set::Dataset;
-use crate::bytes::sha256;
+use super::set::{Dataset, INPUT_BYTES};
 use crate::error::{Error, Problem};
 use crate::files::Check;
-use crate::formats::{Format, LIMITS, Layout, levels, names};
+use crate::formats::{Depth, Format, LIMITS, Layout, TRAINING_BITS, levels, names, to_camera};
 use crate::read::{self, LevelImage};
 use crate::truth::{Document, FrameSummary};
 
-/// Largest recipe, model or map.
-const GIVEN_BYTES: u64 = 1 << 30;
-
-/// Writes a data set in other formats into another folder, and goes on where an earlier conversion was left. Images are copied level by
-/// level, truth mask by mask; recipe, model and seed stay.
+/// Writes a data set in other formats into another folder, or resumes an earlier conversion. Grey levels, masks,
+/// recipe, model and seed are copied unchanged. Calls `report` after each frame, in order.
 ///
 /// # Errors
-/// If `from` is no whole data set, its formats lack what those of `layout` want (noise-free images, planes of stacks), or the system
-/// refuses.
+/// If `from` is not a complete data set, its recipe or model was changed, its formats lack images that `layout` needs
+/// (noise-free images, planes of stacks), or a file cannot be read or written.
 pub fn convert(
     from: &Path,
     to: &Path,
@@ -37,29 +33,29 @@ pub fn convert(
         return refuse(
             &source,
             format!(
-                "the format `folder` wants noise-free images, which {} does not keep; `papsynth generate` with the recipe \
-             of the data set makes them",
+                "the format `folder` needs noise-free images, which {} does not contain; generate the data set again with \
+                 `papsynth generate` and its recipe",
                 source.layout
             ),
         );
     }
     let target = begin(&source, to, layout)?;
-    let (mut kept, mut made, mut open) = (0, 0, None);
+    let (mut present, mut written, mut open) = (0, 0, None);
     let frames = frames_in(&source)?;
     for (shard, frames) in by_shard(&frames, layout.frames_per_shard) {
         if stop.load(Ordering::Relaxed) {
-            return Ok(Outcome { kept, made, stopped: true });
+            return Ok(Outcome { present, written, stopped: true });
         }
         let has_all = |record: ShardRecord| frames.iter().all(|&(index, _)| record.covers(&(index..index + 1)));
-        if target.whole(shard, Check::Sizes)?.is_some_and(has_all) {
-            frames.iter().for_each(|&(index, _)| report(Progress::Kept(index)));
-            kept += frames.len() as u64;
+        if target.complete_record(shard, Check::Sizes)?.is_some_and(has_all) {
+            frames.iter().for_each(|&(index, _)| report(Progress::Present(index)));
+            present += frames.len() as u64;
             continue;
         }
         let mut writer = target.shard_writer(shard)?;
         for &(index, there) in frames {
-            if open.as_ref().is_none_or(|open: &Open| open.record.shard != there) {
-                open = Some(Open::of(&source, there)?);
+            if open.as_ref().is_none_or(|open: &OpenShard| open.record.shard != there) {
+                open = Some(OpenShard::open(&source, layout, there)?);
             }
             let Some(open) = &open else { continue };
             let frame = open.record.frames.iter().find(|frame| frame.index == index);
@@ -67,16 +63,16 @@ pub fn convert(
             writer.begin_with(frame.clone())?;
             open.planes(frame, |plane| writer.write_plane(&plane))?;
             let truth = source.truth_in(&open.document, there, index)?;
-            report(Progress::Made(writer.end_with(&truth, open.sharp(frame)?)?));
+            report(Progress::Written(writer.end_with(&truth, open.edf(frame)?)?));
         }
         writer.commit()?;
-        made += frames.len() as u64;
+        written += frames.len() as u64;
     }
     target.finish()?;
-    Ok(Outcome { kept, made, stopped: false })
+    Ok(Outcome { present, written, stopped: false })
 }
 
-/// Frames of each shard of a layout, with the shard that they come from.
+/// Groups pairs of frame and source shard by the target shard.
 fn by_shard(frames: &[(u64, u64)], each: u64) -> impl Iterator<Item = (u64, &[(u64, u64)])> {
     frames.chunk_by(move |(a, _), (b, _)| a / each == b / each).map(move |chunk| (chunk[0].0 / each, chunk))
 }
@@ -87,15 +83,11 @@ fn refuse<T>(source: &Dataset, message: String) -> Result<T, Error> {
 
 fn begin(source: &Dataset, to: &Path, layout: &Layout) -> Result<Dataset, Error> {
     let Dataset { folder, identity, categories, map, .. } = source;
-    let given = |name: &str| Ok::<_, Error>((name.to_owned(), read::bytes(&folder.inside(name)?, GIVEN_BYTES)?));
-    let mut kept = vec![given(names::RECIPE)?, given(names::MODEL)?];
-    for ((name, bytes), sha) in kept.iter().zip([&identity.recipe_sha256, &identity.model_sha256]) {
-        if sha256(bytes) != *sha {
-            return refuse(source, format!("{name} is not the one that the data set was made from"));
-        }
-    }
-    kept.extend(map.as_deref().map(given).transpose()?);
-    Dataset::begin(to, identity.clone(), layout.clone(), categories.clone(), map.clone(), &kept)
+    let input = |name: &str| Ok::<_, Error>((name.to_owned(), read::bytes(&folder.inside(name)?, INPUT_BYTES)?));
+    source.check_inputs()?;
+    let mut inputs = vec![input(names::RECIPE)?, input(names::MODEL)?];
+    inputs.extend(map.as_deref().map(input).transpose()?);
+    Dataset::begin(to, identity.clone(), layout.clone(), categories.clone(), map.clone(), &inputs)
 }
 
 fn frames_in(source: &Dataset) -> Result<Vec<(u64, u64)>, Error> {
@@ -104,41 +96,42 @@ fn frames_in(source: &Dataset) -> Result<Vec<(u64, u64)>, Error> {
         frames.extend(record(source, shard)?.frames.iter().map(|frame| (frame.index, shard)));
     }
     if frames.is_empty() {
-        return refuse(source, "the data set has no whole frame".to_owned());
+        return refuse(source, "the data set has no complete frame".to_owned());
     }
     Ok(frames)
 }
 
 fn record(source: &Dataset, shard: u64) -> Result<ShardRecord, Error> {
-    match source.whole_or_flaw(shard, Check::Sizes)? {
+    match source.record_or_finding(shard, Check::Sizes)? {
         Ok(record) => Ok(record),
-        Err(flaw) => refuse(source, format!("{flaw}; `papsynth verify` says what is wrong")),
+        Err(finding) => refuse(source, format!("{finding}; `papsynth verify` lists all findings")),
     }
 }
 
-/// A shard whose truth is in memory.
-struct Open<'a> {
+/// A shard with its COCO document in memory.
+struct OpenShard<'a> {
     source: &'a Dataset,
+    target: &'a Layout,
     record: ShardRecord,
     document: Document,
 }
 
-impl<'a> Open<'a> {
-    fn of(source: &'a Dataset, shard: u64) -> Result<Self, Error> {
+impl<'a> OpenShard<'a> {
+    fn open(source: &'a Dataset, target: &'a Layout, shard: u64) -> Result<Self, Error> {
         let record = record(source, shard)?;
         if let Some((path, message)) = source.folder.first_flaw(&record.files, Check::Hashes)? {
-            return refuse(source, format!("{path} {message}; `papsynth verify` says what is wrong"));
+            return refuse(source, format!("{path}: {message}; `papsynth verify` lists all findings"));
         }
-        Ok(Self { source, record, document: source.document(shard)? })
+        Ok(Self { source, target, record, document: source.document(shard)? })
     }
 
     fn planes(&self, frame: &FrameSummary, mut take: impl FnMut(Plane) -> Result<(), Error>) -> Result<(), Error> {
-        let Self { source, record, document } = self;
+        let Self { source, record, document, .. } = self;
         let Dataset { folder, layout, .. } = source;
-        let format = layout.formats.iter().find(|format| !frame.is_stack() || format.has_planes());
-        let Some(format) = format else {
-            return refuse(source, format!("{layout} keeps no planes of stacks"));
+        let Some(format) = layout.best_format(frame.is_stack()) else {
+            return refuse(source, format!("{layout} does not contain the planes of stacks"));
         };
+        self.check_depth(format, frame, |_| true)?;
         let name = format.image(source.identity.seed, record.shard, frame);
         let mut noise_free = match layout.has(Format::Folder) {
             true => {
@@ -153,11 +146,11 @@ impl<'a> Open<'a> {
         let saturated = document.saturated(frame.index).map_err(Error::input(&coco))?;
         let mut index = 0;
         let mut failure = None;
-        let mut hand_over = |page| {
+        let mut convert_page = |page| {
             let grey = levels(page, frame.channels);
             let noise_free = match &mut noise_free {
                 Some((path, pages)) => {
-                    pages.next().ok_or_else(|| Error::input(path)(Problem::unfit("it has too few planes")))?
+                    pages.next().ok_or_else(|| Error::input(path)(Problem::unfit("has too few planes")))?
                 }
                 None => vec![0.0; frame.values()],
             };
@@ -168,13 +161,13 @@ impl<'a> Open<'a> {
                 grey,
                 noise_free,
                 saturated: saturated.get(index).cloned().unwrap_or_default(),
-                floored: frame.floored.get(index).copied().unwrap_or_default(),
+                clipped_px: frame.clipped_px.get(index).copied().unwrap_or_default(),
             })?;
             index += 1;
             Ok(())
         };
         let read = pages(source, &name, frame, record.shard, &mut |page| {
-            hand_over(page).map_err(|error| {
+            convert_page(page).map_err(|error| {
                 failure = Some(error);
                 Problem::unfit("")
             })
@@ -182,19 +175,39 @@ impl<'a> Open<'a> {
         failure.map_or(read, Err)
     }
 
-    /// The levels of a stack's picture with everything in focus; of a single plane none.
-    fn sharp(&self, frame: &FrameSummary) -> Result<Vec<u16>, Error> {
+    /// Returns the grey levels of the extended-depth-of-field image of a stack; none for a single plane.
+    fn edf(&self, frame: &FrameSummary) -> Result<Vec<u16>, Error> {
         if !frame.is_stack() {
             return Ok(Vec::new());
         }
         let Self { source, record, .. } = self;
-        let (_, Some(name)) = source.images_of(frame, record.shard) else {
+        let Some((name, format)) = source.layout.sharp_image(source.identity.seed, record.shard, frame) else {
             let layout = &source.layout;
-            return refuse(source, format!("{layout} keeps no picture of a stack with everything in focus"));
+            return refuse(source, format!("{layout} does not contain the extended-depth-of-field image of a stack"));
         };
+        self.check_depth(format, frame, |target| matches!(target, Format::Folder | Format::Qupath))?;
         let files = images(source, &name, record.shard)?;
         let file = files.first().map(Vec::as_slice).unwrap_or_default();
         let image = LevelImage::decode(file, &LIMITS).map_err(Error::input(&source.folder.path(&name)))?;
-        Ok(levels(image, frame.channels))
+        Ok(levels(to_camera(image, frame.bits), frame.channels))
+    }
+
+    /// Checks that a source of 8-bit images is not converted to a format with the bit depth of the camera. `uses` tells whether a target
+    /// format has these images.
+    fn check_depth(&self, from: Format, frame: &FrameSummary, uses: impl Fn(Format) -> bool) -> Result<(), Error> {
+        let deep = self.target.formats.iter().find(|format| format.depth() == Depth::Camera && uses(**format));
+        match deep {
+            Some(deep) if frame.bits > TRAINING_BITS && from.depth() == Depth::Training => refuse(
+                self.source,
+                format!(
+                    "the format `{}` needs {} bits, but `{}` has {TRAINING_BITS}; convert a data set with `folder`, `ome-tiff`, \
+                     `ome-zarr` or `qupath`, or run `papsynth generate` with the recipe",
+                    deep.name(),
+                    frame.bits,
+                    from.name(),
+                ),
+            ),
+            _ => Ok(()),
+        }
     }
 }

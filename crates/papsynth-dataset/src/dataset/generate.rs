@@ -1,4 +1,4 @@
-//! Making frames: several side by side, skipping those that are whole.
+//! Generation of frames, several at once, except those that are complete.
 
 use std::iter::StepBy;
 use std::ops::Range;
@@ -15,88 +15,86 @@ use crate::error::Error;
 use crate::files::Check;
 use crate::truth::FrameSummary;
 
-/// Which frames to make, and how.
+/// Options of [`Dataset::generate`].
 #[derive(Debug, Clone)]
 pub struct Run<'a> {
     /// Indices of the frames.
     pub frames: Range<u64>,
-    /// Which of the shards: all, or every so many.
-    pub share: Share,
-    /// How many shards are worked on side by side, each on a thread of its own; with 1, all are made on the calling thread.
-    pub at_once: usize,
-    /// How many threads work on one frame. The bytes are the same.
+    /// The part of the shards to generate.
+    pub task: Task,
+    /// Number of shards at once, each on one thread. With 1, the calling thread generates all.
+    pub workers: usize,
+    /// Number of threads for one frame. It does not change the output.
     pub threads: Threads,
-    /// How carefully shards that are there are looked at, before they are kept.
+    /// The check of shards that are already present.
     pub check: Check,
-    /// Set to end early: frames that are being made are completed, no other is begun; shards that lack frames are given up.
+    /// Set it to stop early: frames in work are completed, unfinished shards are discarded.
     pub stop: &'a AtomicBool,
-    /// What adds up how long writing takes.
+    /// Accumulates the time of writing.
     pub profile: Option<&'a Profile>,
 }
 
-/// The shards of one of several runs that share the work: those whose number divided by `of` leaves `index`.
+/// One of several tasks that generate a data set together: the shards whose number modulo `total` is `index`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Share {
-    /// Which, from 0.
+pub struct Task {
+    /// Number of the task, from 0.
     pub index: u64,
-    /// Of how many, at least 1.
-    pub of: u64,
+    /// Number of tasks, at least 1.
+    pub total: u64,
 }
 
-impl Share {
-    /// All shards.
-    pub const ALL: Self = Self { index: 0, of: 1 };
+impl Task {
+    /// The only task: all shards.
+    pub const ALL: Self = Self { index: 0, total: 1 };
 
-    /// Those of these numbers that are its own, in order: there may be more of them than fit into memory.
-    pub(crate) fn among(self, numbers: Range<u64>) -> StepBy<Range<u64>> {
-        let of = self.of.max(1);
-        // No number leaves more than it is divided by.
-        let end = if self.index < of { numbers.end } else { numbers.start };
-        // The first from the start on that leaves `index`.
-        let first = numbers.start.saturating_add((self.index % of + of - numbers.start % of) % of);
-        (first..end).step_by(usize::try_from(of).unwrap_or(usize::MAX))
+    /// Returns the numbers in a range that belong to the task, in order.
+    pub(crate) fn select(self, numbers: Range<u64>) -> StepBy<Range<u64>> {
+        let total = self.total.max(1);
+        // A remainder is below `total`: tasks beyond it are empty.
+        let end = if self.index < total { numbers.end } else { numbers.start };
+        let first = numbers.start.saturating_add((self.index % total + total - numbers.start % total) % total);
+        (first..end).step_by(usize::try_from(total).unwrap_or(usize::MAX))
     }
 }
 
-/// A frame is done.
+/// Progress of a run: one frame is done.
 #[derive(Debug, Clone, Copy)]
 pub enum Progress<'a> {
-    /// It was whole already and is left untouched.
-    Kept(u64),
-    /// It was made.
-    Made(&'a FrameSummary),
+    /// The frame with this index was already present.
+    Present(u64),
+    /// The frame was written.
+    Written(&'a FrameSummary),
 }
 
-/// What a run did.
+/// The result of a run.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Outcome {
-    /// Frames that were whole already.
-    pub kept: u64,
-    /// Frames that were made.
-    pub made: u64,
+    /// Number of frames that were already present.
+    pub present: u64,
+    /// Number of frames that were written.
+    pub written: u64,
     /// Whether it was stopped before its end.
     pub stopped: bool,
 }
 
 impl Dataset {
-    /// Makes the shards of a range of frames that are not whole, and reports each frame as it is done, in any order.
+    /// Generates the incomplete shards of a range of frames. Calls `report` after each frame, in any order.
     ///
-    /// The merged files are not touched: see [`finish`](Self::finish).
+    /// The merged files are not changed: see [`finish`](Self::finish).
     ///
     /// # Errors
-    /// If the range begins within a shard; else the first failure of the engine or the system: frames that are being made are
-    /// completed, no other is begun.
+    /// If the range begins inside a shard, the engine has another recipe, the engine fails, or a file cannot be
+    /// written. After an error, frames in work are completed and no other frame is started.
     pub fn generate(&self, engine: &Engine, run: &Run, report: &(dyn Fn(Progress) + Sync)) -> Result<Outcome, Error> {
         if sha256(engine.recipe().to_toml().as_bytes()) != self.identity.recipe_sha256 {
-            let message = "the engine is of another recipe than the data set".to_owned();
-            return Err(Error::folder(self.path(), message));
+            return Err(Error::folder(self.path(), "the recipe of the engine is not that of the data set"));
         }
         if let Some(message) = self.layout.refusal_of(&run.frames) {
             return Err(Error::folder(self.path(), message));
         }
         let each = self.layout.frames_per_shard;
-        let shards = run.share.among(run.frames.start / each..run.frames.end.div_ceil(each));
-        let workers = run.at_once.min(shards.size_hint().0);
+        let shards = run.task.select(run.frames.start / each..run.frames.end.div_ceil(each));
+        let workers = run.workers.min(shards.size_hint().0);
         let (shards, outcome) = (Mutex::new(shards), Mutex::new(Ok(Outcome::default())));
         let work = || {
             loop {
@@ -105,19 +103,23 @@ impl Dataset {
                     return;
                 }
                 let stops = run.stop.load(Ordering::Relaxed);
-                let made = if stops { Ok(STOPPED) } else { self.make(engine, shard, run, report) };
-                let gave_up = made.as_ref().is_ok_and(|made| made.stopped);
+                let done = if stops { Ok(STOPPED) } else { self.generate_shard(engine, shard, run, report) };
+                let is_stopped = done.as_ref().is_ok_and(|done| done.stopped);
                 let mut outcome = locked(&outcome);
-                match (&mut *outcome, made) {
-                    (Ok(sum), Ok(made)) => {
-                        let stopped = sum.stopped || made.stopped;
-                        *sum = Outcome { kept: sum.kept + made.kept, made: sum.made + made.made, stopped };
+                match (&mut *outcome, done) {
+                    (Ok(sum), Ok(done)) => {
+                        let stopped = sum.stopped || done.stopped;
+                        *sum = Outcome {
+                            present: sum.present + done.present,
+                            written: sum.written + done.written,
+                            stopped,
+                        };
                     }
                     (Ok(_), Err(error)) => *outcome = Err(error),
                     (Err(_), _) => {}
                 }
-                // There may be more shards than could be gone through.
-                if gave_up {
+                // Skipping the remaining shards one by one could take long.
+                if is_stopped {
                     return;
                 }
             }
@@ -131,20 +133,26 @@ impl Dataset {
     }
 
     fn frames_of(&self, shard: u64, run: &Run) -> Range<u64> {
-        let room = self.frames_of_shard(shard);
-        room.start.max(run.frames.start)..room.end.min(run.frames.end)
+        let own = self.frames_of_shard(shard);
+        own.start.max(run.frames.start)..own.end.min(run.frames.end)
     }
 
-    fn make(&self, engine: &Engine, shard: u64, run: &Run, report: &dyn Fn(Progress)) -> Result<Outcome, Error> {
+    fn generate_shard(
+        &self,
+        engine: &Engine,
+        shard: u64,
+        run: &Run,
+        report: &dyn Fn(Progress),
+    ) -> Result<Outcome, Error> {
         let frames = self.frames_of(shard, run);
         let count = frames.end.saturating_sub(frames.start);
-        if self.whole(shard, run.check)?.is_some_and(|record| record.covers(&frames)) {
-            frames.for_each(|index| report(Progress::Kept(index)));
-            return Ok(Outcome { kept: count, ..Outcome::default() });
+        if self.complete_record(shard, run.check)?.is_some_and(|record| record.covers(&frames)) {
+            frames.for_each(|index| report(Progress::Present(index)));
+            return Ok(Outcome { present: count, ..Outcome::default() });
         }
         let mut writer = run.files(|| self.shard_writer(shard))?;
         for index in frames.clone() {
-            // A shard may take minutes: it is given up, and made again from its beginning.
+            // A shard may take minutes, so it is discarded.
             if index > frames.start && run.stop.load(Ordering::Relaxed) {
                 return Ok(STOPPED);
             }
@@ -152,21 +160,22 @@ impl Dataset {
             run.files(|| writer.begin(&scene))?;
             let finished =
                 engine.image::<Error>(scene, run.threads, |plane| run.files(|| writer.write_plane(plane)))?;
-            report(Progress::Made(run.files(|| writer.end(&finished))?));
+            report(Progress::Written(run.files(|| writer.end(&finished))?));
         }
         run.files(|| writer.commit())?;
-        Ok(Outcome { made: count, ..Outcome::default() })
+        Ok(Outcome { written: count, ..Outcome::default() })
     }
 }
 
-/// A shard that was given up, or not begun.
-const STOPPED: Outcome = Outcome { kept: 0, made: 0, stopped: true };
+/// The outcome of a shard that was discarded or not started.
+const STOPPED: Outcome = Outcome { present: 0, written: 0, stopped: true };
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Run<'_> {
+    /// Adds the time of `work` to the profile.
     fn files<T>(&self, work: impl FnOnce() -> T) -> T {
         match self.profile {
             Some(profile) => profile.time(Stage::Files, work),
@@ -180,14 +189,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_share_is_what_leaves_its_number_when_divided() {
+    fn a_task_contains_the_numbers_with_its_remainder() {
         for (start, end) in [(0, 0), (0, 1), (0, 17), (5, 17), (6, 6), (9, 4)] {
-            for (index, of) in [(0, 1), (0, 4), (1, 4), (3, 4), (4, 4), (7, 4), (16, 40), (30, 40)] {
-                let found: Vec<u64> = Share { index, of }.among(start..end).collect();
-                let slow: Vec<u64> = (start..end).filter(|number| number % of == index).collect();
-                assert_eq!(found, slow, "{index}/{of} of {start}..{end}");
+            for (index, total) in [(0, 1), (0, 4), (1, 4), (3, 4), (4, 4), (7, 4), (16, 40), (30, 40)] {
+                let found: Vec<u64> = Task { index, total }.select(start..end).collect();
+                let slow: Vec<u64> = (start..end).filter(|number| number % total == index).collect();
+                assert_eq!(found, slow, "{index}/{total} of {start}..{end}");
             }
         }
-        assert_eq!(Share::ALL.among(0..u64::MAX).nth(7), Some(7));
+        assert_eq!(Task::ALL.select(0..u64::MAX).nth(7), Some(7));
     }
 }

@@ -1,4 +1,4 @@
-//! Frames of a data set read back: their images and their truth, whatever the format; compared with those of another, and as fields to measure.
+//! Reading of frames: images and ground truth in every format, comparison of two data sets, and fields to measure.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,114 +13,116 @@ use crate::error::{Error, Problem};
 use crate::files::Check;
 #[cfg(feature = "zarr")]
 use crate::formats::read_planes;
-use crate::formats::{Format, LIMITS, Take, TarFile, levels, names, parquet};
+use crate::formats::{Format, LIMITS, Take, TarFile, levels, names, parquet, to_camera};
 use crate::read::{self, FieldFile, LevelImage, NucleiFile, files_in};
 use crate::truth::FrameSummary;
 
-/// Where a recorded frame lies.
+/// The location of a recorded frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct FramePlace {
+pub struct FrameLocation {
     /// Index of the frame.
     pub index: u64,
-    /// The shard that holds it.
+    /// Number of its shard.
     pub shard: u64,
 }
 
 impl Dataset {
-    /// Where the recorded frames lie, by index. Where every frame is a shard of its own, no record is read.
+    /// Returns the locations of all recorded frames, sorted by index. It reads no records if each shard has one frame.
     ///
     /// # Errors
     /// If a record cannot be read.
-    pub fn places(&self) -> Result<Vec<FramePlace>, Error> {
+    pub fn frame_locations(&self) -> Result<Vec<FrameLocation>, Error> {
         let shards = recorded_shards(&self.folder)?;
         if self.layout.is_by_frame() {
-            return Ok(shards.into_iter().map(|shard| FramePlace { index: shard, shard }).collect());
+            return Ok(shards.into_iter().map(|shard| FrameLocation { index: shard, shard }).collect());
         }
-        let mut places = Vec::new();
+        let mut locations = Vec::new();
         for shard in shards {
             let frames = read_record(&self.folder, shard)?.frames;
-            places.extend(frames.iter().map(|frame| FramePlace { index: frame.index, shard }));
+            locations.extend(frames.iter().map(|frame| FrameLocation { index: frame.index, shard }));
         }
-        Ok(places)
+        Ok(locations)
     }
 
-    /// What is recorded of a frame.
+    /// Returns the recorded summary of a frame.
     ///
     /// # Errors
-    /// If the record of its shard cannot be read, or does not know it.
-    pub fn summary(&self, place: FramePlace) -> Result<FrameSummary, Error> {
-        let frames = read_record(&self.folder, place.shard)?.frames;
-        frames.into_iter().find(|frame| frame.index == place.index).ok_or_else(|| {
-            let message = format!("it has no frame {}", place.index);
-            let path = self.folder.path(&names::record(place.shard));
+    /// If the record of its shard cannot be read or does not contain the frame.
+    pub fn summary(&self, location: FrameLocation) -> Result<FrameSummary, Error> {
+        let frames = read_record(&self.folder, location.shard)?.frames;
+        frames.into_iter().find(|frame| frame.index == location.index).ok_or_else(|| {
+            let message = format!("contains no frame {}", location.index);
+            let path = self.folder.path(&names::record(location.shard));
             Error::input(&path)(Problem::broken("JSON", message))
         })
     }
 
-    /// Whether the data set has the planes of stacks, rather than their pictures with everything in focus alone.
+    /// Whether the data set contains the planes of stacks, not only their extended-depth-of-field images.
     #[must_use]
     pub fn has_planes(&self) -> bool {
         self.with_planes().is_some()
     }
 
     fn with_planes(&self) -> Option<Format> {
-        let mut formats = self.layout.formats.iter().copied();
-        formats.find(|format| format.has_planes() && format.needs().is_none())
+        self.layout.best_format(true).filter(|format| format.needs().is_none())
     }
 
-    /// Hands over the planes of a frame, one after the other: row by row, the channels of a pixel side by side, levels of 0 to [`FrameSummary::white`].
-    /// Of a stack whose planes the data set does not have ([`has_planes`](Self::has_planes)) it is one, with everything in focus.
+    /// Calls `take` with the number and the grey levels of each plane of a frame: row by row, channels interleaved,
+    /// from 0 to [`FrameSummary::white`]. For a stack without planes ([`has_planes`](Self::has_planes)), the only plane
+    /// is the extended-depth-of-field image.
     ///
     /// # Errors
-    /// If the image cannot be read, or is not what is recorded of it.
+    /// If the image cannot be read or differs from the record.
     pub fn planes(&self, frame: &FrameSummary, shard: u64, take: &mut dyn FnMut(usize, Vec<u16>)) -> Result<(), Error> {
-        let due = frame.planes_um.len();
-        let format = self.with_planes().filter(|_| due > 1);
+        let expected = frame.planes_um.len();
+        let format = self.with_planes().filter(|_| expected > 1);
         let Some(format) = format else {
-            let page = picture(self, frame, shard)?;
-            take(0, whole(page, frame).map_err(|problem| frame.wrong(problem.to_string()))?);
+            let page = display_image(self, frame, shard)?;
+            take(0, checked_levels(page, frame).map_err(|problem| frame.wrong(problem.to_string()))?);
             return Ok(());
         };
         let name = format.image(self.identity.seed, shard, frame);
         let mut number = 0;
         pages(self, &name, frame, shard, &mut |page| {
-            if number < due {
-                take(number, whole(page, frame)?);
+            if number < expected {
+                take(number, checked_levels(page, frame)?);
             }
             number += 1;
             Ok(())
         })?;
-        let all = Problem::unless(number == due, format!("has {number} planes; the record says {due}"));
-        all.map_err(Error::input(&self.folder.path(&name)))
+        let complete = Problem::unless(number == expected, format!("planes: found {number}, expected {expected}"));
+        complete.map_err(Error::input(&self.folder.path(&name)))
     }
 
-    /// What is known of a frame.
+    /// Reads the ground truth of a frame.
     ///
     /// # Errors
-    /// If it cannot be read, or what it says does not fit together.
-    pub fn truth(&self, place: FramePlace) -> Result<Truth, Error> {
-        self.truth_in(&self.document(place.shard)?, place.shard, place.index)
+    /// If it cannot be read or is inconsistent.
+    pub fn truth(&self, location: FrameLocation) -> Result<Truth, Error> {
+        self.truth_in(&self.document(location.shard)?, location.shard, location.index)
     }
 }
 
-/// The image that shows a frame in one plane: of a stack the one with everything in focus or, where that was not written, the middle
-/// plane.
-pub(super) fn picture(dataset: &Dataset, frame: &FrameSummary, shard: u64) -> Result<LevelImage, Error> {
-    let (image, all_in_focus) = dataset.images_of(frame, shard);
-    let name = all_in_focus.unwrap_or(image);
+/// Reads the image that shows a frame in one plane: for a stack the extended-depth-of-field image or, if it is missing,
+/// the central plane.
+pub(super) fn display_image(dataset: &Dataset, frame: &FrameSummary, shard: u64) -> Result<LevelImage, Error> {
+    let seed = dataset.identity.seed;
+    let edf = frame.is_stack().then(|| dataset.layout.edf_image(seed, shard, frame)).flatten();
+    let best = || dataset.layout.best_format(false).map(|format| format.image(seed, shard, frame));
+    let name = edf.map(|(name, _)| name).or_else(best).unwrap_or_default();
     let path = dataset.folder.path(&name);
-    let (mut number, mut middle) = (0, None);
+    let (mut number, mut central) = (0, None);
     pages(dataset, &name, frame, shard, &mut |page| {
         if number <= frame.planes_um.len() / 2 {
-            middle = Some(page);
+            central = Some(page);
         }
         number += 1;
         Ok(())
     })?;
-    middle.ok_or_else(|| Error::input(&path)(Problem::NoImages))
+    central.ok_or_else(|| Error::input(&path)(Problem::NoImages))
 }
 
-/// Hands over the pages of an image of a frame, one after the other.
+/// Calls `take` with each page of an image of a frame.
 pub(super) fn pages(
     dataset: &Dataset,
     name: &str,
@@ -130,6 +132,7 @@ pub(super) fn pages(
 ) -> Result<(), Error> {
     if !name.ends_with(names::ZARR_GROUP) {
         let mut files = images(dataset, name, shard)?.into_iter();
+        let take = &mut |page| take(to_camera(page, frame.bits));
         let read = files.try_for_each(|file| LevelImage::pages(&file, &LIMITS, take));
         return read.map_err(Error::input(&dataset.folder.path(name)));
     }
@@ -142,12 +145,12 @@ pub(super) fn pages(
     }
 }
 
-/// The files that make up an image of the data set: one, or one for each plane.
+/// Reads the files of an image of the data set: one, or one for each plane.
 pub(super) fn images(dataset: &Dataset, name: &str, shard: u64) -> Result<Vec<Vec<u8>>, Error> {
     let folder = &dataset.folder;
     if let Some((file, image)) = name.split_once(".parquet/") {
         let file = format!("{file}.parquet");
-        is_as_recorded(dataset, &file, shard)?;
+        check_hash(dataset, &file, shard)?;
         return parquet::images(&folder.inside(&file)?, image);
     }
     Ok(vec![match name.split_once(".tar/") {
@@ -156,8 +159,8 @@ pub(super) fn images(dataset: &Dataset, name: &str, shard: u64) -> Result<Vec<Ve
     }])
 }
 
-/// What a library reads that takes files on trust has the SHA-256 that is recorded. It is compared once.
-fn is_as_recorded(dataset: &Dataset, file: &str, shard: u64) -> Result<(), Error> {
+/// Checks the SHA-256 of a file once, before a library reads it that does not validate its input.
+fn check_hash(dataset: &Dataset, file: &str, shard: u64) -> Result<(), Error> {
     let mut trusted = dataset.trusted.lock().unwrap_or_else(PoisonError::into_inner);
     if trusted.contains(file) {
         return Ok(());
@@ -165,7 +168,7 @@ fn is_as_recorded(dataset: &Dataset, file: &str, shard: u64) -> Result<(), Error
     let record = read_record(&dataset.folder, shard)?;
     let flaw = match record.files.iter().find(|found| found.path == file) {
         Some(found) => dataset.folder.flaw(found, Check::Hashes)?,
-        None => Some("is in no record".to_owned()),
+        None => Some("no record lists this file".to_owned()),
     };
     match flaw {
         Some(flaw) => Err(Error::input(&dataset.folder.path(file))(Problem::unfit(flaw))),
@@ -176,40 +179,40 @@ fn is_as_recorded(dataset: &Dataset, file: &str, shard: u64) -> Result<(), Error
     }
 }
 
-/// The levels of a page that is as large as the record says.
-fn whole(page: LevelImage, frame: &FrameSummary) -> Result<Vec<u16>, Problem> {
+/// Returns the grey levels of a page after a check of its size.
+fn checked_levels(page: LevelImage, frame: &FrameSummary) -> Result<Vec<u16>, Problem> {
     let FrameSummary { width, height, channels, .. } = *frame;
     let found = [page.width, page.height(), page.channels];
     if found[..2] != [width, height] || found[2] > channels {
         return Err(Problem::unfit(format!(
-            "an image is {} x {} of {} channels; the record says {width} x {height} of {channels}",
+            "image size: found {} x {} px with {} channel(s), expected {width} x {height} px with {channels} channel(s)",
             found[0], found[1], found[2]
         )));
     }
     Ok(levels(page, channels))
 }
 
-/// Of every recorded frame, by index, the slide and where its image lies.
+/// Returns the slide and the image path of every recorded frame, by index.
 ///
 /// # Errors
-/// If a record cannot be read, or is missing of a shard that was merged.
-pub fn images_of(dataset: &Dataset) -> Result<BTreeMap<u64, (u64, String)>, Error> {
+/// If a record is missing or cannot be read.
+pub fn image_paths(dataset: &Dataset) -> Result<BTreeMap<u64, (u64, String)>, Error> {
     let mut images = BTreeMap::new();
     for shard in dataset.shards()? {
         for frame in read_record(&dataset.folder, shard)?.frames {
-            let (image, _) = dataset.images_of(&frame, shard);
+            let (image, _) = dataset.image_paths(&frame, shard);
             images.insert(frame.index, (frame.slide, image));
         }
     }
     Ok(images)
 }
 
-/// The first difference between what lies where in two data sets: objects, classes, places, complete and visible masks. Stain,
-/// defocus and detectability may differ.
+/// Returns the first difference between the ground truth of two data sets: objects, classes, positions, complete and
+/// visible masks. Absorbance, defocus and detectability may differ.
 ///
 /// # Errors
-/// If one is no data set, or its truth cannot be read.
-pub fn truth_differs(one: &Path, other: &Path) -> Result<Option<String>, Error> {
+/// If one is not a data set, or its ground truth cannot be read.
+pub fn truth_difference(one: &Path, other: &Path) -> Result<Option<String>, Error> {
     let (one, other) = (Dataset::open(one)?, Dataset::open(other)?);
     let mut there = Vec::new();
     for shard in recorded_shards(&other.folder)? {
@@ -234,45 +237,44 @@ pub fn truth_differs(one: &Path, other: &Path) -> Result<Option<String>, Error> 
 
 fn difference(one: &Truth, other: &Truth) -> Option<String> {
     if one.objects.len() != other.objects.len() {
-        return Some(format!("{} objects and parts, not {}", other.objects.len(), one.objects.len()));
+        return Some(format!("found {} objects and parts, expected {}", other.objects.len(), one.objects.len()));
     }
     let what = |a: &ObjectTruth, b: &ObjectTruth| {
-        let claims = [
+        let properties = [
             ("id", a.id == b.id && a.part == b.part && a.kind == b.kind),
             ("class", a.class == b.class),
-            ("place", a.centre_um == b.centre_um && a.depth_um == b.depth_um && a.rotation_deg == b.rotation_deg),
+            ("position", a.centre_um == b.centre_um && a.depth_um == b.depth_um && a.rotation_deg == b.rotation_deg),
             ("complete mask", a.amodal == b.amodal),
-            ("visible mask", a.front == b.front),
+            ("visible mask", a.visible == b.visible),
         ];
-        claims.into_iter().find(|(_, same)| !same).map(|(what, _)| format!("object {} has another {what}", a.id))
+        properties.into_iter().find(|(_, same)| !same).map(|(what, _)| format!("the {what} of object {} differs", a.id))
     };
     one.objects.iter().zip(&other.objects).find_map(|(a, b)| what(a, b))
 }
 
-/// The fields in a folder, in the order of their names: a data set of ours with its masks of nuclei; or images (in the folder,
-/// or in `images`), with masks of the same names in `masks` (labels, or anything above 0), or for each image
-/// a table `NAME.csv` of `y,x` points beside it, and `frames.csv` that says which group each belongs to.
+/// Returns the fields in a folder, sorted by name. The folder is a data set with masks of nuclei, or contains images
+/// (in it or in `images`). Nuclei of images are masks of the same name in `masks` (labels, or values above 0), or a
+/// table `NAME.csv` of `y,x` points next to the image. `frames.csv` lists the group of each image.
 ///
 /// # Errors
-/// If there is no image, the folder cannot be read, or its tables make no sense.
+/// If there is no image, the folder cannot be read, or its tables are invalid.
 pub fn field_files(folder: &Path) -> Result<Vec<FieldFile>, Error> {
     if folder.join(names::MANIFEST).exists() { of_dataset(folder) } else { files_in(folder) }
 }
 
-/// The frames of a data set, which must all be whole; of a stack, its image with everything in focus.
+/// Returns the frames of a complete data set; for stacks, their extended-depth-of-field images.
 fn of_dataset(path: &Path) -> Result<Vec<FieldFile>, Error> {
     let dataset = Dataset::open(path)?;
     let Dataset { folder, layout, .. } = &dataset;
     if !layout.has(Format::Folder) {
-        let message =
-            format!("the data set lies in files as {layout}; images and labels are read from the format `folder`");
+        let message = format!("the layout is {layout}; the format `folder` is needed to read images and labels");
         return Err(Error::folder(path, message));
     }
     let mut fields = Vec::new();
     for shard in recorded_shards(folder)? {
-        let record = dataset.whole_or_flaw(shard, Check::Sizes)?.map_err(|flaw| {
+        let record = dataset.record_or_finding(shard, Check::Sizes)?.map_err(|finding| {
             let message =
-                format!("shard {shard} is not whole: {flaw}; `papsynth generate` with its recipe makes it again");
+                format!("shard {shard} is damaged: {finding}; generate it again with `papsynth generate --verify`");
             Error::folder(path, message)
         })?;
         for frame in record.frames {
@@ -290,7 +292,7 @@ fn of_dataset(path: &Path) -> Result<Vec<FieldFile>, Error> {
         }
     }
     match fields.is_empty() {
-        true => Err(Error::folder(path, "the data set has no whole frame")),
+        true => Err(Error::folder(path, "the data set has no complete frame")),
         false => Ok(fields),
     }
 }

@@ -1,4 +1,4 @@
-//! What is in a folder.
+//! Statistics of a data set.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -6,55 +6,47 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use super::contents::Finding;
 use super::manifest::Manifest;
 use super::record::recorded_shards;
 use super::set::Dataset;
 use crate::error::Error;
 use crate::files::{Check, Folder};
 
-/// What a data set holds.
+/// Statistics of a data set.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Overview {
-    /// What it is made from. Its number of frames is that of the last merge: if it is not [`frames`](Self::frames),
-    /// the merged files do not know all.
+    /// The manifest. Its number of frames is that of the last merge: if it differs from [`frames`](Self::frames), the
+    /// merged files are out of date.
     pub manifest: Manifest,
-    /// Number of whole frames.
+    /// Number of complete frames.
     pub frames: u64,
-    /// Ranges of indices without a whole frame, below the largest index there is.
+    /// Ranges of indices without a complete frame, below the largest index.
     pub missing: Vec<Range<u64>>,
-    /// Shards of which something is wrong; their frames are among the missing.
-    pub defects: Vec<Defect>,
-    /// What is wrong with the files of the whole data set, such as `coco.json`.
-    pub flaws: Vec<String>,
+    /// First defect of each damaged shard. The frames of these shards are missing.
+    pub damaged_shards: Vec<Finding>,
+    /// Defects of merged files, for example `coco.json`.
+    pub damaged_files: Vec<Finding>,
     /// Number of objects and parts of cells by category.
     pub objects: BTreeMap<String, u64>,
-    /// How many of them lie partly outside their image.
+    /// Number of them that are partly outside their image.
     pub truncated: u64,
-    /// Columns and rows of the images.
+    /// Sizes of the images: columns and rows.
     pub sizes: BTreeSet<[usize; 2]>,
     /// Smallest and largest size of a pixel, µm.
     pub pixel_um: [f64; 2],
-    /// Numbers of focal planes.
+    /// Numbers of focal planes of the frames.
     pub planes: BTreeSet<usize>,
     /// Bits of a grey level.
     pub bits: BTreeSet<u32>,
-    /// Size of the files of all whole frames.
+    /// Size of the files of all complete frames.
     pub bytes: u64,
 }
 
-/// Why a shard is not whole.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Defect {
-    /// Number of the shard.
-    pub shard: u64,
-    /// What is wrong.
-    pub message: String,
-}
-
-/// Looks at the data set in a folder.
+/// Reads the statistics of the data set in a folder.
 ///
 /// # Errors
-/// If there is none, or the system refuses to read.
+/// If there is none, or a file cannot be read.
 pub fn inspect(path: &Path, check: Check) -> Result<Overview, Error> {
     let folder = Folder::new(path);
     let manifest = Manifest::read(&folder)?;
@@ -63,8 +55,8 @@ pub fn inspect(path: &Path, check: Check) -> Result<Overview, Error> {
         manifest,
         frames: 0,
         missing: Vec::new(),
-        defects: Vec::new(),
-        flaws: Vec::new(),
+        damaged_shards: Vec::new(),
+        damaged_files: Vec::new(),
         objects: BTreeMap::new(),
         truncated: 0,
         sizes: BTreeSet::new(),
@@ -74,14 +66,16 @@ pub fn inspect(path: &Path, check: Check) -> Result<Overview, Error> {
         bytes: 0,
     };
     for file in &overview.manifest.files {
-        overview.flaws.extend(folder.flaw(file, check)?.map(|message| format!("{} {message}", file.path)));
+        let flaw = folder.flaw(file, check)?;
+        overview.damaged_files.extend(flaw.map(|message| Finding::damaged(&file.path, message)));
     }
-    let mut next = 0;
+    let (mut next, mut last_damaged) = (0, None);
     for shard in recorded_shards(&folder)? {
-        let record = match dataset.whole_or_flaw(shard, check)? {
+        let record = match dataset.record_or_finding(shard, check)? {
             Ok(record) => record,
-            Err(flaw) => {
-                overview.defects.push(Defect { shard, message: flaw.to_string() });
+            Err(finding) => {
+                overview.damaged_shards.push(finding);
+                last_damaged = Some(shard);
                 continue;
             }
         };
@@ -103,30 +97,29 @@ pub fn inspect(path: &Path, check: Check) -> Result<Overview, Error> {
             overview.bits.insert(frame.bits);
         }
     }
-    // What a damaged shard at the end had is not known; it has room for these.
+    // The frames of a damaged last shard are unknown: all that it can contain count as missing.
     let each = overview.manifest.layout.frames_per_shard;
-    let last = overview.defects.last().map(|d| d.shard.saturating_add(1).saturating_mul(each));
+    let last = last_damaged.map(|shard| shard.saturating_add(1).saturating_mul(each));
     if let Some(last) = last.filter(|last| *last > next) {
         overview.missing.push(next..last);
     }
     Ok(overview)
 }
 
-/// The shards that lack a frame of a range, or that are not whole by the sizes of their files: from their records alone, so that it can be asked
-/// while others write.
+/// Returns the shards that are incomplete or lack a frame of a range. It reads only records and files of shards, so
+/// that it can run while other processes write.
 ///
 /// # Errors
-/// If the system refuses to read.
-pub fn shards_to_make(dataset: &Dataset, frames: Range<u64>, check: Check) -> Result<Vec<Range<u64>>, Error> {
+/// If a file cannot be read.
+pub fn missing_shards(dataset: &Dataset, frames: Range<u64>, check: Check) -> Result<Vec<Range<u64>>, Error> {
     let each = dataset.layout.frames_per_shard;
     let dataset = &Dataset { folder: dataset.folder.listed()?, ..dataset.clone() };
     let all = frames.start / each..frames.end.div_ceil(each);
     let (mut missing, mut next) = (Vec::new(), all.start);
-    // Most that are missing are known by that alone.
     for shard in recorded_shards(&dataset.folder)?.into_iter().filter(|shard| all.contains(shard)) {
-        let room = dataset.frames_of_shard(shard);
-        let wanted = room.start.max(frames.start)..room.end.min(frames.end);
-        if dataset.whole(shard, check)?.is_some_and(|record| record.covers(&wanted)) {
+        let own = dataset.frames_of_shard(shard);
+        let wanted = own.start.max(frames.start)..own.end.min(frames.end);
+        if dataset.complete_record(shard, check)?.is_some_and(|record| record.covers(&wanted)) {
             missing.extend((next < shard).then_some(next..shard));
             next = shard + 1;
         }

@@ -1,4 +1,4 @@
-//! The manifest: what a data set is made from, and every file.
+//! The manifest: the identity of a data set and the list of its files.
 
 use std::fmt::{self, Formatter};
 use std::fs::File;
@@ -7,33 +7,33 @@ use std::io::{self, BufReader, Read};
 use serde::de::{SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::record::{FORMAT, Identity, inside, version};
+use super::record::{FORMAT, Identity, check_paths, check_version};
 use crate::bytes::{json, sha256};
 use crate::error::{Error, Problem};
 use crate::files::{FileRecord, Folder};
 use crate::formats::{Layout, names};
 use crate::truth::Category;
 
-/// The head of `manifest.json`, and of its list of files those of the whole data set; those of shards are in their records.
+/// The head of `manifest.json` and the merged files of its list. The records of shards list the other files.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Manifest {
-    /// What wrote it.
+    /// Program and version that wrote it.
     pub writer: String,
-    /// What the data set is made from.
+    /// The identity: seed, versions and hashes of the inputs.
     pub identity: Identity,
-    /// How it lies in files.
+    /// The layout of the files.
     pub layout: Layout,
-    /// What there may be in its images.
+    /// Categories of objects in its images.
     pub categories: Vec<Category>,
-    /// Number of frames when it was written; the files of later ones are not in it.
+    /// Number of frames when it was written; it does not list the files of later frames.
     pub frames: u64,
-    /// Number of shards that they lie in.
+    /// Number of shards of these frames.
     pub shards: u64,
-    /// The files that are no shard's.
+    /// The files that belong to no shard.
     pub files: Vec<FileRecord>,
 }
 
-/// The file: written without its list, which follows piece by piece.
+/// The content of `manifest.json`. The list of files is written separately, entry by entry.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ManifestFile {
@@ -45,14 +45,14 @@ pub(super) struct ManifestFile {
     pub(super) frames: u64,
     pub(super) shards: u64,
     pub(super) categories: Vec<Category>,
-    /// SHA-256 of the head as compact JSON in which this is empty.
+    /// SHA-256 of the head as compact JSON in which this field is empty.
     pub(super) head_sha256: String,
-    #[serde(skip_serializing, deserialize_with = "of_no_shard")]
+    #[serde(skip_serializing, deserialize_with = "merged_files")]
     pub(super) files: Vec<FileRecord>,
 }
 
 impl ManifestFile {
-    /// With the SHA-256 of the head.
+    /// Returns the head with its SHA-256.
     pub(super) fn sealed(mut self) -> Self {
         self.head_sha256 = String::new();
         self.head_sha256 = sha256(&json(&self));
@@ -60,11 +60,11 @@ impl ManifestFile {
     }
 }
 
-/// Of a list of files, which may be longer than memory, those that belong to no shard: they come first, before the first record.
-fn of_no_shard<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<FileRecord>, D::Error> {
-    struct Top;
+/// Reads the files that belong to no shard from a list that may be larger than the memory.
+fn merged_files<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<FileRecord>, D::Error> {
+    struct MergedFiles;
 
-    impl<'de> Visitor<'de> for Top {
+    impl<'de> Visitor<'de> for MergedFiles {
         type Value = Vec<FileRecord>;
 
         fn expecting(&self, f: &mut Formatter<'_>) -> fmt::Result {
@@ -82,7 +82,7 @@ fn of_no_shard<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<FileRec
         }
     }
 
-    deserializer.deserialize_seq(Top)
+    deserializer.deserialize_seq(MergedFiles)
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -91,7 +91,7 @@ pub(crate) struct Entry {
     pub(crate) path: String,
     pub(crate) bytes: u64,
     pub(crate) sha256: String,
-    /// The shard it is of, if it is of one.
+    /// Number of the shard, if the file belongs to one.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub(crate) shard: Option<u64>,
 }
@@ -100,7 +100,7 @@ impl Manifest {
     /// Parses a manifest.
     ///
     /// # Errors
-    /// If it is none, or of another version.
+    /// If it is invalid or of another version.
     pub fn from_json(bytes: &[u8]) -> Result<Self, Problem> {
         Self::from_reader(&mut &*bytes)
     }
@@ -109,7 +109,7 @@ impl Manifest {
         let path = folder.inside(names::MANIFEST)?;
         let file = File::open(&path).map_err(|e| match e.kind() {
             io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
-                Error::folder(folder.root(), "holds no data set: there is no manifest.json")
+                Error::folder(folder.root(), "contains no data set: manifest.json is missing")
             }
             _ => Error::io("read", &path)(e),
         })?;
@@ -119,18 +119,18 @@ impl Manifest {
     fn from_reader(reader: &mut dyn Read) -> Result<Self, Problem> {
         let file: ManifestFile = serde_json::from_reader(reader)?;
         if file.format != FORMAT {
-            let message = format!("format is `{}`; `{FORMAT}` is wanted", file.format.escape_default());
+            let message = format!("format: expected `{FORMAT}`, found `{}`", file.format.escape_default());
             return Err(Problem::broken("JSON", message));
         }
-        version(file.version)?;
-        inside(&file.files)?;
+        check_version(file.version)?;
+        check_paths(&file.files)?;
         file.layout.check()?;
-        let said = file.head_sha256.clone();
+        let expected = file.head_sha256.clone();
         let ManifestFile { writer, identity, layout, frames, shards, categories, files, head_sha256, .. } =
             file.sealed();
-        match head_sha256 == said {
+        match head_sha256 == expected {
             true => Ok(Self { writer, identity, layout, categories, frames, shards, files }),
-            false => Err(Problem::broken("JSON", "is not as it was written: the SHA-256 of its head is another")),
+            false => Err(Problem::broken("JSON", "was changed: the SHA-256 of its head differs")),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What is known of all frames, in one place. Only one shard is held at a time.
+//! Merged files of all shards. One shard at a time is in memory.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
@@ -6,10 +6,10 @@ use std::io::{self, Write};
 use sha2::{Digest, Sha256};
 
 use super::card::{card, croissant};
-use super::images::picture;
+use super::images::display_image;
 use super::manifest::{Entry, ManifestFile};
-use super::picture::ContactSheet;
 use super::record::{FORMAT, FORMAT_VERSION, WRITER, read_record, recorded_shards};
+use super::rgb_image::ContactSheet;
 use super::set::{Dataset, SHARD_FILE_BYTES, Summary};
 use crate::bytes::{hex, json, json_lines};
 use crate::error::Error;
@@ -20,18 +20,19 @@ use crate::read;
 use crate::truth::{Annotation, Info, Row, Split, typed_columns};
 use papsynth::white_level as white;
 
-/// Takes the content of a file piece by piece.
+/// Receives the content of a file in pieces.
 pub(crate) type Sink<'a> = dyn FnMut(&[u8]) -> Result<(), Error> + Send + 'a;
 
-/// Does with a file of this name and content what is to be done, and says how it is.
-type Keep<'a> = dyn FnMut(&str, &dyn Fn(&mut Sink) -> Result<(), Error>) -> Result<FileRecord, Error> + 'a;
+/// Writes or hashes a file of this name and content, and returns its record.
+type Process<'a> = dyn FnMut(&str, &dyn Fn(&mut Sink) -> Result<(), Error>) -> Result<FileRecord, Error> + 'a;
 
 impl Dataset {
-    /// Merges what is known of all whole shards into `manifest.json`, the data card, `croissant.json` and `splits.csv`, `contact-sheet.png` and, where every frame
-    /// is a shard, `objects.csv` and `coco.json`; one shard at a time in their order. What is there already and the same is left untouched.
+    /// Merges all complete shards into `manifest.json`, the data card, `croissant.json`, `splits.csv` and
+    /// `contact-sheet.png` and, if each shard has one frame, `objects.csv` and `coco.json`. Files with the same content
+    /// are not rewritten.
     ///
     /// # Errors
-    /// If a file of a shard cannot be read any more, or the system refuses.
+    /// If a file cannot be read or written.
     pub fn finish(&self) -> Result<Summary, Error> {
         let listed = Self { folder: self.folder.listed()?, ..self.clone() };
         merge(&listed).map_err(|error| self.folder.named(error))
@@ -40,20 +41,20 @@ impl Dataset {
 
 fn merge(dataset: &Dataset) -> Result<Summary, Error> {
     let folder = &dataset.folder;
-    let whole = Whole::find(dataset)?;
+    let complete = CompleteShards::find(dataset)?;
     let given = dataset.given().map(|name| folder.record(name)).collect::<Result<Vec<_>, _>>()?;
-    let merged = files(dataset, &whole, WRITER, given, &mut |name, fill| {
+    let merged = files(dataset, &complete, WRITER, given, &mut |name, fill| {
         folder.write_if_new(name, |out| fill(&mut |bytes| out.bytes(bytes)))
     })?;
     folder.sync_names(&merged)?;
-    let manifest = write_manifest(dataset, &merged, &whole.shards, whole.summary.frames)?;
+    let manifest = write_manifest(dataset, &merged, &complete.shards, complete.summary.frames)?;
     folder.sync_names([&manifest])?;
-    Ok(Summary { root: manifest.sha256, ..whole.summary })
+    Ok(Summary { root: manifest.sha256, ..complete.summary })
 }
 
-/// The files of no shard as they would be merged now, with the words of the program that wrote the data set; none is written.
+/// Computes the records of the merged files without writing them. `writer` is the program named in the texts.
 pub(super) fn expected(dataset: &Dataset, writer: &str, given: Vec<FileRecord>) -> Result<Vec<FileRecord>, Error> {
-    files(dataset, &Whole::find(dataset)?, writer, given, &mut |name, fill| {
+    files(dataset, &CompleteShards::find(dataset)?, writer, given, &mut |name, fill| {
         let (mut hash, mut count) = (Sha256::new(), 0);
         fill(&mut |bytes| {
             hash.update(bytes);
@@ -64,79 +65,82 @@ pub(super) fn expected(dataset: &Dataset, writer: &str, given: Vec<FileRecord>) 
     })
 }
 
-/// The shards that are whole, and what their records say.
+/// The complete shards and the contents of their records.
 #[derive(Default)]
-struct Whole {
+struct CompleteShards {
     shards: Vec<u64>,
-    /// Files of formats that keep many frames in a file.
+    /// Files of formats with many frames in a file.
     sharded: Vec<FileRecord>,
-    /// The splits by slide that frames fall into, in order.
+    /// The splits by slide of the frames, sorted.
     splits: Vec<Split>,
     summary: Summary,
 }
 
-impl Whole {
+impl CompleteShards {
     fn find(dataset: &Dataset) -> Result<Self, Error> {
         let folder = &dataset.folder;
-        let mut whole = Self::default();
+        let mut complete = Self::default();
         let mut splits = BTreeSet::new();
         for shard in recorded_shards(folder)? {
-            let Ok(record) = dataset.whole_or_flaw(shard, Check::Sizes)? else {
-                whole.summary.damaged.push(shard);
+            let Ok(record) = dataset.record_or_finding(shard, Check::Sizes)? else {
+                complete.summary.damaged.push(shard);
                 continue;
             };
-            whole.shards.push(shard);
-            whole.summary.frames += record.frames.len() as u64;
+            complete.shards.push(shard);
+            complete.summary.frames += record.frames.len() as u64;
             for frame in record.frames {
-                add(&mut whole.summary.objects, frame.objects);
-                add(&mut whole.summary.lost_px, frame.lost_px);
+                add(&mut complete.summary.objects, frame.objects);
+                add(&mut complete.summary.occluded_px, frame.occluded_px);
                 splits.insert(Split::of_slide(dataset.identity.seed, frame.slide));
             }
-            whole.sharded.extend(record.files.into_iter().filter(|file| is_sharded(&file.path)));
+            complete.sharded.extend(record.files.into_iter().filter(|file| is_sharded(&file.path)));
         }
-        whole.splits.extend(splits);
-        Ok(whole)
+        complete.splits.extend(splits);
+        let is_empty = |split: &Split| !complete.splits.contains(split);
+        let empty = Split::ALL.into_iter().filter(is_empty).map(|split| split.name().to_owned());
+        complete.summary.empty_splits = empty.collect();
+        Ok(complete)
     }
 }
 
-/// Makes every file that follows from the shards, and lists it with those that were given.
+/// Processes every merged file, and returns all records with those of the input files.
 fn files(
     dataset: &Dataset,
-    Whole { shards, sharded, splits: splits_there, summary }: &Whole,
+    CompleteShards { shards, sharded, splits: splits_there, summary }: &CompleteShards,
     writer: &str,
     given: Vec<FileRecord>,
-    keep: &mut Keep,
+    process: &mut Process,
 ) -> Result<Vec<FileRecord>, Error> {
     let folder = &dataset.folder;
     let mut merged = given;
     if !shards.is_empty() {
         if dataset.layout.is_by_frame() {
-            merged.push(keep(names::TABLE, &|out| tables(folder, shards, out))?);
-            merged.push(keep(names::COCO, &|out| documents(dataset, shards, out))?);
+            merged.push(process(names::TABLE, &|out| tables(folder, shards, out))?);
+            merged.push(process(names::COCO, &|out| documents(dataset, shards, out))?);
             if dataset.layout.objects_parquet {
-                merged.push(keep(names::OBJECTS, &|out| objects(dataset, shards, out))?);
+                merged.push(process(names::OBJECTS, &|out| objects(dataset, shards, out))?);
             }
         }
-        merged.push(keep(names::SPLITS, &|out| splits(dataset, shards, out))?);
+        merged.push(process(names::SPLITS, &|out| splits(dataset, shards, out))?);
         let sheet = contact_sheet(dataset, shards)?;
-        merged.push(keep(names::SHEET, &|out| out(&sheet))?);
+        merged.push(process(names::SHEET, &|out| out(&sheet))?);
         let classes: Vec<String> = dataset.categories.iter().map(|category| category.name.clone()).collect();
         for format in &dataset.layout.formats {
             for (name, bytes) in format.shared(&classes, splits_there)? {
-                merged.push(keep(&name, &|out| out(&bytes))?);
+                merged.push(process(&name, &|out| out(&bytes))?);
             }
         }
         let card = card(dataset, writer, summary);
-        merged.push(keep(names::CARD, &|out| out(card.as_bytes()))?);
+        merged.push(process(names::CARD, &|out| out(card.as_bytes()))?);
         let described: Vec<FileRecord> = merged.iter().chain(sharded).cloned().collect();
         let text = json_lines(&croissant(dataset, &described));
-        merged.push(keep(names::CROISSANT, &|out| out(&text))?);
+        merged.push(process(names::CROISSANT, &|out| out(&text))?);
     }
     merged.sort_by(|a, b| a.path.cmp(&b.path));
     Ok(merged)
 }
 
-/// Whether a file is one of a format that keeps many frames in a file.
+/// Whether a file belongs to a format with many frames in a file.
 fn is_sharded(path: &str) -> bool {
     let first = path.split('/').next();
     Format::ALL.into_iter().any(|format| format.is_sharded() && first == Some(format.name()))
@@ -148,7 +152,7 @@ fn add(sums: &mut BTreeMap<String, u64>, counts: BTreeMap<String, u64>) {
     }
 }
 
-/// Which split each frame falls into, by itself and by its slide.
+/// Writes the split of each frame, by field and by slide.
 fn splits(dataset: &Dataset, shards: &[u64], out: &mut Sink) -> Result<(), Error> {
     out(b"image,slide,by_field,by_slide\n")?;
     let seed = dataset.identity.seed;
@@ -162,7 +166,7 @@ fn splits(dataset: &Dataset, shards: &[u64], out: &mut Sink) -> Result<(), Error
     Ok(())
 }
 
-/// The tables one below the other, under the header of the first.
+/// Writes the concatenated tables with one header.
 fn tables(folder: &Folder, shards: &[u64], out: &mut Sink) -> Result<(), Error> {
     for (i, &index) in shards.iter().enumerate() {
         let text = read::bytes(&folder.inside(&names::table(index))?, SHARD_FILE_BYTES)?;
@@ -218,7 +222,7 @@ fn write_objects(dataset: &Dataset, shards: &[u64], pieces: &mut Pieces) -> Resu
     table.end()
 }
 
-/// Hands on what is written piece by piece, and keeps the first error, of which the writer knows only that there is one.
+/// A writer to a sink that keeps the first error of the sink.
 struct Pieces<'a, 's> {
     out: &'a mut Sink<'s>,
     failure: Option<Error>,
@@ -228,7 +232,7 @@ impl Write for Pieces<'_, '_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         (self.out)(bytes).map(|()| bytes.len()).map_err(|error| {
             self.failure.get_or_insert(error);
-            io::Error::other("what was written is not taken")
+            io::Error::other("the sink failed")
         })
     }
 
@@ -242,27 +246,27 @@ fn contact_sheet(dataset: &Dataset, shards: &[u64]) -> Result<Vec<u8>, Error> {
     let frames = shards.iter().map(|&shard| read_record(folder, shard).map(|record| record.frames.len()));
     let count = frames.take(ContactSheet::MAX_FRAMES).sum::<Result<usize, _>>()?;
     let mut sheet = ContactSheet::new(count);
-    let mut left = ContactSheet::MAX_FRAMES;
+    let mut remaining = ContactSheet::MAX_FRAMES;
     for &shard in shards {
-        if left == 0 {
+        if remaining == 0 {
             break;
         }
         let record = read_record(folder, shard)?;
         let document = dataset.document(shard)?;
         let path = folder.path(&names::coco(shard));
-        for frame in record.frames.iter().take(left) {
-            let image = picture(dataset, frame, shard)?;
+        for frame in record.frames.iter().take(remaining) {
+            let image = display_image(dataset, frame, shard)?;
             let masks = document.annotations.iter().filter(|a| a.image_id == frame.index).map(Annotation::amodal);
             let masks = masks.collect::<Result<Vec<_>, _>>().map_err(Error::input(&path))?;
             sheet.add(&names::numbered(frame.index), &image, white(frame.bits), &masks);
         }
         folder.release(record.files.iter().map(|file| file.path.as_str()));
-        left = left.saturating_sub(record.frames.len());
+        remaining = remaining.saturating_sub(record.frames.len());
     }
-    sheet.picture.to_png().map_err(Error::io("encode", &folder.path(names::SHEET)))
+    sheet.image.to_png().map_err(Error::io("encode", &folder.path(names::SHEET)))
 }
 
-/// The head, then every file: those of no shard, then shard by shard, each record after the files it vouches for.
+/// Writes the manifest: the head, the merged files, then the files of each shard, each record after the files it lists.
 pub(super) fn write_manifest(
     dataset: &Dataset,
     merged: &[FileRecord],
@@ -274,14 +278,12 @@ pub(super) fn write_manifest(
         .write_if_new(names::MANIFEST, |out| manifest(dataset, WRITER, merged, shards, frames, &mut |b| out.bytes(b)))
 }
 
-/// The manifest of a data set without a frame, unless there is any manifest by now. Says whether it was written.
+/// Writes the manifest of an empty data set unless one exists. Returns whether it was written.
 pub(super) fn begin_manifest(dataset: &Dataset) -> Result<bool, Error> {
-    dataset
-        .folder
-        .write_unless_there(names::MANIFEST, |out| manifest(dataset, WRITER, &[], &[], 0, &mut |b| out.bytes(b)))
+    dataset.folder.write_new(names::MANIFEST, |out| manifest(dataset, WRITER, &[], &[], 0, &mut |b| out.bytes(b)))
 }
 
-/// The SHA-256 of the manifest of all shards that are recorded.
+/// Computes the SHA-256 of the manifest of all recorded shards.
 pub(super) fn manifest_sha256(dataset: &Dataset, writer: &str, merged: &[FileRecord]) -> Result<String, Error> {
     let shards = recorded_shards(&dataset.folder)?;
     let frames = shards.iter().map(|&shard| Ok(read_record(&dataset.folder, shard)?.frames.len() as u64));
@@ -316,7 +318,7 @@ fn manifest(
         files: Vec::new(),
     };
     let head = json(&head.sealed());
-    // The list is put into the head's braces by hand: it may be longer than memory.
+    // The list is appended inside the braces of the head, because it may be larger than the memory.
     out(head.strip_suffix(b"}").unwrap_or(&head))?;
     out(b",\"files\":[")?;
     let mut first = true;
@@ -345,12 +347,12 @@ mod tests {
     use crate::formats::Layout;
     use crate::support::{SEED, frame, recipe};
 
-    /// A data set of one stack, from nothing.
+    /// Generates a data set of one stack.
     fn make(path: &Path) -> Result<(), Error> {
         let layout = Layout::new([Format::Folder, Format::OmeZarr].into_iter().filter(|f| f.needs().is_none()));
         let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout: &layout };
         let dataset = Dataset::create_or_resume(path, &info)?;
-        if dataset.whole(0, Check::Sizes)?.is_none() {
+        if dataset.complete_record(0, Check::Sizes)?.is_none() {
             let frame = frame(0, 2, 8, 1);
             let mut writer = dataset.shard_writer(0)?;
             writer.begin(&frame.finished.scene)?;
@@ -362,8 +364,8 @@ mod tests {
     }
 
     #[test]
-    fn wherever_the_disk_fails_no_file_is_partial_and_the_next_run_completes_the_set() {
-        // The manifest is written at the beginning and at the end.
+    fn after_any_disk_failure_no_file_is_partial_and_the_next_run_completes_the_set() {
+        // The manifest is written at the start and at the end.
         let failures = fault::everywhere("faults", 40, names::MANIFEST, make);
         assert!(failures > 50, "{failures}");
     }

@@ -1,4 +1,4 @@
-//! Data sets: begun and resumed, made, merged, read back, verified.
+//! Data sets: creation and resumption, generation, merging, reading, verification.
 
 mod begin;
 mod card;
@@ -9,28 +9,28 @@ mod images;
 mod inspect;
 mod manifest;
 mod merge;
-mod picture;
+mod occupied;
 mod record;
+mod rgb_image;
 mod set;
 mod shard_writer;
-mod taken;
 mod verify;
 
 pub use begin::DatasetInfo;
-pub use contents::{Finding, Mend};
+pub use contents::{Finding, Fix};
 pub use convert::convert;
-pub use generate::{Outcome, Progress, Run, Share};
-pub use images::{FramePlace, field_files, images_of, truth_differs};
-pub use inspect::{Defect, Overview, inspect, shards_to_make};
+pub use generate::{Outcome, Progress, Run, Task};
+pub use images::{FrameLocation, field_files, image_paths, truth_difference};
+pub use inspect::{Overview, inspect, missing_shards};
 pub use manifest::Manifest;
-pub use picture::{Picture, write_png};
+pub(crate) use occupied::nested_below;
+#[cfg(feature = "zarr")]
+pub(crate) use occupied::{SLIDE, any_content, recipe_difference, refuse_nested};
 pub use record::{Identity, ShardRecord};
 #[cfg(feature = "zarr")]
-pub(crate) use record::{WRITER, lies_inside};
+pub(crate) use record::{WRITER, is_inside};
 pub(crate) use record::{read_record, recorded_shards};
+pub use rgb_image::{RgbImage, write_png};
 pub use set::{Dataset, Summary};
 pub use shard_writer::ShardWriter;
-pub(crate) use taken::nested_below;
-#[cfg(feature = "zarr")]
-pub(crate) use taken::{SLIDE, recipe_difference, refuse_nested, stranger};
-pub use verify::{Verdict, verify};
+pub use verify::{VerifyProgress, VerifyReport, verify, verify_with_progress};

@@ -1,4 +1,4 @@
-//! What is recorded of a shard, and of what it is made from.
+//! Records of shards, and the identity of a data set.
 
 use std::ops::Range;
 use std::path::{Component, Path};
@@ -17,32 +17,33 @@ use crate::truth::FrameSummary;
 
 pub(crate) const FORMAT_VERSION: u32 = 2;
 
-/// What says that a folder is one of ours.
+/// Name of the format in `manifest.json`.
 pub(crate) const FORMAT: &str = "papsynth-dataset";
 
-/// The program that wrote a file: the same recipe gives the same pixels by every release with the same
-/// `stream_version`, but not always the same compressed bytes.
+/// Program and version that write files. Releases with the same `stream_version` write the same pixels, but not always
+/// the same compressed bytes.
 pub(crate) const WRITER: &str = concat!("papsynth-dataset ", env!("CARGO_PKG_VERSION"));
 
+/// Largest record, bytes.
 const RECORD_BYTES: u64 = 1 << 28;
 
-/// Largest side of an image, as wide as a field may be.
-const LARGEST_SIDE_PX: usize = 1 << 15;
+/// Largest width and height of an image, as for fields.
+const MAX_SIDE_PX: usize = 1 << 15;
 
-/// Most planes of a stack, as many as a recipe may ask for.
-const MOST_PLANES: usize = 1024;
+/// Largest number of planes of a stack, as in recipes.
+const MAX_PLANES: usize = 1024;
 
-/// What decides every image of a data set.
+/// The identity of a data set: data sets with equal identities have equal pixels.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identity {
-    /// Seed of the data set.
+    /// Seed.
     pub seed: u64,
     /// Version of the mapping from recipe, model, seed and index to images.
     pub stream_version: u32,
-    /// Version of the recipe's format.
+    /// Version of the recipe format.
     pub recipe_version: u32,
-    /// Version of the model's format.
+    /// Version of the model format.
     pub model_version: u32,
     /// SHA-256 of `recipe.toml`.
     pub recipe_sha256: String,
@@ -51,7 +52,7 @@ pub struct Identity {
 }
 
 impl Identity {
-    /// What decides of what is made from these, and the texts of recipe and model whose hashes stand in it.
+    /// Returns the identity with the texts of recipe and model whose hashes it contains.
     pub(crate) fn of(recipe: &Recipe, model: &Model, seed: u64) -> (Self, String, String) {
         let (recipe_toml, model_json) = (recipe.to_toml(), model.to_json());
         let identity = Self {
@@ -66,25 +67,25 @@ impl Identity {
     }
 }
 
-/// Says that a shard is whole: written after all its files.
+/// The record of a complete shard, written after all its files.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ShardRecord {
-    /// Version of the layout.
+    /// Version of the format.
     pub version: u32,
-    /// What wrote the files.
+    /// Program and version that wrote the files.
     pub writer: String,
-    /// What the frames were made from.
+    /// Identity of the data set.
     pub identity: Identity,
-    /// How they lie in files.
+    /// Layout of the files.
     pub layout: Layout,
     /// Number of the shard.
     pub shard: u64,
-    /// Its frames in a few numbers each, by index.
+    /// Summaries of its frames, sorted by index.
     pub frames: Vec<FrameSummary>,
-    /// Its files, by path.
+    /// Its files, sorted by path.
     pub files: Vec<FileRecord>,
-    /// SHA-256 of the record as compact JSON in which this is empty: a bit that turns over does not go unnoticed.
+    /// SHA-256 of the record as compact JSON in which this field is empty.
     pub sha256: String,
 }
 
@@ -92,19 +93,19 @@ impl ShardRecord {
     /// Parses a record.
     ///
     /// # Errors
-    /// If it is none, is of another version, was changed after it was written, or names a file outside the data set.
+    /// If it is invalid, of another version, was changed after it was written, or lists a file outside the data set.
     pub fn from_json(bytes: &[u8]) -> Result<Self, Problem> {
         let record: Self = serde_json::from_slice(bytes)?;
-        version(record.version)?;
-        inside(&record.files)?;
+        check_version(record.version)?;
+        check_paths(&record.files)?;
         record.layout.check()?;
         record.check_frames()?;
         if record.sealed().sha256 != record.sha256 {
-            return Err(json("is not as it was written: its own SHA-256 is another".to_owned()));
+            return Err(json("was changed: its SHA-256 differs".to_owned()));
         }
-        // The manifest vouches for the bytes of a record, and not for what they say.
+        // The manifest lists the hash of the bytes.
         if record.to_json() != bytes {
-            return Err(json("is not as it was written: it says the same in other bytes".to_owned()));
+            return Err(json("was reformatted: the content is equal, but not the bytes".to_owned()));
         }
         Ok(record)
     }
@@ -113,24 +114,27 @@ impl ShardRecord {
         bytes::json_lines(self)
     }
 
-    /// Frames must be of this shard, in order, and of sizes that there are: what is read of them is allocated by these numbers.
+    /// Checks that the frames belong to the shard, are sorted, and have valid sizes, because readers allocate by these
+    /// numbers.
     fn check_frames(&self) -> Result<(), Problem> {
         let each = self.layout.frames_per_shard;
-        let room = self.shard.saturating_mul(each)..self.shard.saturating_add(1).saturating_mul(each);
-        let mut before = None;
+        let range = self.shard.saturating_mul(each)..self.shard.saturating_add(1).saturating_mul(each);
+        let mut previous = None;
         for frame in &self.frames {
             let FrameSummary { index, width, height, bits, channels, .. } = *frame;
-            let (side, planes) = (1..=LARGEST_SIDE_PX, frame.planes_um.len());
-            let wrong = if !room.contains(&index) || before.is_some_and(|before| before >= index) {
-                "is none of this shard, or not in order".to_owned()
+            let (side, planes) = (1..=MAX_SIDE_PX, frame.planes_um.len());
+            let wrong = if !range.contains(&index) {
+                format!("shard {} contains frames {} to {}", self.shard, range.start, range.end.saturating_sub(1))
+            } else if let Some(previous) = previous.filter(|previous| *previous >= index) {
+                format!("after frame {previous}; expected ascending indices")
             } else if !side.contains(&width) || !side.contains(&height) {
-                format!("{width} x {height} pixels; expected 1 to {LARGEST_SIDE_PX} a side")
+                format!("size {width} x {height} px; expected 1 to {MAX_SIDE_PX} in each direction")
             } else if ![1, 3].contains(&channels) || !(1..=16).contains(&bits) {
-                format!("{channels} channels of {bits} bits; expected 1 or 3 of 1 to 16")
-            } else if !(1..=MOST_PLANES).contains(&planes) {
-                format!("{planes} planes; expected 1 to {MOST_PLANES}")
+                format!("channels {channels}, bits {bits}; expected 1 or 3 channels and 1 to 16 bits")
+            } else if !(1..=MAX_PLANES).contains(&planes) {
+                format!("planes {planes}; expected 1 to {MAX_PLANES}")
             } else {
-                before = Some(index);
+                previous = Some(index);
                 continue;
             };
             return Err(json(format!("frame {index}: {wrong}")));
@@ -138,12 +142,13 @@ impl ShardRecord {
         Ok(())
     }
 
+    /// Returns the record with its SHA-256.
     pub(crate) fn sealed(&self) -> Self {
         let open = Self { sha256: String::new(), ..self.clone() };
         Self { sha256: sha256(&bytes::json(&open)), ..open }
     }
 
-    /// Whether it has all frames with an index in a range.
+    /// Whether the shard contains all frames of a range of indices.
     #[must_use]
     pub fn covers(&self, frames: &Range<u64>) -> bool {
         let has = |index| self.frames.binary_search_by_key(&index, |frame| frame.index).is_ok();
@@ -151,17 +156,23 @@ impl ShardRecord {
     }
 }
 
-/// The record of a shard; a missing one is an [`Problem::Missing`].
+/// Reads the record of a shard.
+///
+/// # Errors
+/// If it is invalid, or missing: [`Problem::Missing`].
 pub(crate) fn read_record(folder: &Folder, shard: u64) -> Result<ShardRecord, Error> {
     let path = folder.inside(&names::record(shard))?;
     let record = ShardRecord::from_json(&read::bytes(&path, RECORD_BYTES)?).map_err(Error::input(&path))?;
     if record.shard != shard {
-        return Err(Error::input(&path)(json(format!("is the record of shard {}", record.shard))));
+        return Err(Error::input(&path)(json(format!(
+            "expected the record of shard {shard}, found that of shard {}",
+            record.shard
+        ))));
     }
     Ok(record)
 }
 
-/// Numbers of all shards with a record, in order.
+/// Returns the numbers of all shards with a record, sorted.
 pub(crate) fn recorded_shards(folder: &Folder) -> Result<Vec<u64>, Error> {
     let names = folder.names_in(names::SHARDS)?;
     let mut found: Vec<u64> = names.iter().filter_map(|name| names::number_of_record(name)).collect();
@@ -169,25 +180,27 @@ pub(crate) fn recorded_shards(folder: &Folder) -> Result<Vec<u64>, Error> {
     Ok(found)
 }
 
-/// Whether a path is relative and stays below where it starts.
-pub(crate) fn lies_inside(path: &str) -> bool {
-    // A name as it stands is one part of a path: no `.`, `..`, drive or root, and nothing between two slashes.
+/// Whether a path is relative and stays inside its folder.
+pub(crate) fn is_inside(path: &str) -> bool {
+    // Every part is a plain name: not `.`, `..`, a drive, the root, or empty.
     let is_name = |part: &str| Path::new(part).components().eq([Component::Normal(part.as_ref())]);
     !path.is_empty() && !path.contains(['\0', '\\']) && path.split('/').all(is_name)
 }
 
-pub(super) fn inside(files: &[FileRecord]) -> Result<(), Problem> {
-    match files.iter().find(|file| !lies_inside(&file.path)) {
-        Some(file) => Err(json(format!("the file `{}` lies outside the data set", file.path.escape_default()))),
+/// Checks that all files are inside the data set.
+pub(super) fn check_paths(files: &[FileRecord]) -> Result<(), Problem> {
+    match files.iter().find(|file| !is_inside(&file.path)) {
+        Some(file) => Err(json(format!("lists the file `{}` outside the data set", file.path.escape_default()))),
         None => Ok(()),
     }
 }
 
-pub(super) fn version(found: u32) -> Result<(), Problem> {
+/// Checks the version of the format.
+pub(super) fn check_version(found: u32) -> Result<(), Problem> {
     if found == FORMAT_VERSION {
         return Ok(());
     }
-    Err(json(format!("version is {found}; this program reads and writes version {FORMAT_VERSION}")))
+    Err(json(format!("version: expected {FORMAT_VERSION}, found {found}")))
 }
 
 fn json(message: String) -> Problem {

@@ -1,4 +1,4 @@
-//! A data set that lies in a folder, and what is read of its shards.
+//! A data set in a folder, and the reading of its shards.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -10,19 +10,23 @@ use serde::Serialize;
 
 use super::manifest::Manifest;
 use super::record::{Identity, recorded_shards};
-use crate::error::Error;
-use crate::files::{FileRecord, Folder, Home};
+use crate::bytes::sha256;
+use crate::error::{Error, Problem};
+use crate::files::{FileRecord, Folder, Location};
 use crate::formats::{Layout, names};
 use crate::read;
 use crate::truth::{Category, Document, FrameSummary};
 
-/// What was written for one shard is read whole.
+/// Largest file of a shard that is read, bytes.
 pub(super) const SHARD_FILE_BYTES: u64 = 1 << 32;
+
+/// Largest recipe, model or map that is read, bytes.
+pub(super) const INPUT_BYTES: u64 = 1 << 30;
 
 /// A data set in a folder.
 ///
-/// Shards may be written in any order, by several threads, and by several processes; each is whole when its record
-/// (`shards/N.json`) is there. Nothing outside the folder is touched.
+/// Several threads and processes may write shards in any order. A shard is complete when its record (`shards/N.json`)
+/// exists. No file outside the folder is changed.
 #[derive(Debug, Clone)]
 pub struct Dataset {
     pub(crate) folder: Folder,
@@ -30,32 +34,34 @@ pub struct Dataset {
     pub(crate) layout: Layout,
     pub(crate) categories: Vec<Category>,
     pub(crate) map: Option<String>,
-    /// Files whose SHA-256 has been compared with their record.
+    /// Files whose SHA-256 was compared with their record.
     pub(super) trusted: Arc<Mutex<BTreeSet<String>>>,
 }
 
-/// A data set in a few numbers.
+/// Counts of a data set.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct Summary {
-    /// Number of whole frames.
+    /// Number of complete frames.
     pub frames: u64,
-    /// Number of objects and parts of cells by category, as `coco.json` names it.
+    /// Number of objects and parts of cells by category of `coco.json`.
     pub objects: BTreeMap<String, u64>,
-    /// Shards that were begun, but of which a file is missing or of another size: they are not in the merged files.
+    /// Shards with a missing file or a file of wrong size. The merged files do not include them.
     pub damaged: Vec<u64>,
-    /// Pixels of masks, by group, that formats with one label a pixel do not show.
-    pub lost_px: BTreeMap<String, u64>,
-    /// SHA-256 of the manifest that was written, which names every file with its own: two data sets with the same are the same.
+    /// Pixels of masks, by group, that are occluded in formats with one label a pixel.
+    pub occluded_px: BTreeMap<String, u64>,
+    /// Names of the splits by slide without frames ("train", "val", "test"). Small data sets have few slides.
+    pub empty_splits: Vec<String>,
+    /// SHA-256 of the manifest, which lists the SHA-256 of every file: data sets with equal roots are equal.
     pub root: String,
 }
 
 impl Dataset {
-    /// The data set that lies in a folder.
+    /// Opens the data set in a folder.
     ///
     /// # Errors
-    /// If there is none, or the system refuses to read.
-    pub fn open(home: impl Into<Home>) -> Result<Self, Error> {
-        let folder = Folder::new(home);
+    /// If there is none, or its manifest cannot be read.
+    pub fn open(location: impl Into<Location>) -> Result<Self, Error> {
+        let folder = Folder::new(location);
         let manifest = Manifest::read(&folder).map_err(|error| folder.named(error))?;
         Ok(Self::of(folder, manifest))
     }
@@ -68,37 +74,37 @@ impl Dataset {
         Self { folder, identity, layout, categories, map, trusted: Arc::default() }
     }
 
-    /// Where it lies; of one in an object store, where its files are worked on.
+    /// The folder; for a data set in an object store, the folder of local copies.
     #[must_use]
     pub fn path(&self) -> &Path {
         self.folder.root()
     }
 
-    /// What it is made from.
+    /// The identity: seed, versions and hashes of the inputs.
     #[must_use]
     pub fn identity(&self) -> &Identity {
         &self.identity
     }
 
-    /// How it lies in files.
+    /// The layout of the files.
     #[must_use]
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
 
-    /// Indices of the frames that a shard has room for.
+    /// Indices of the frames that a shard can contain.
     #[must_use]
     pub fn frames_of_shard(&self, shard: u64) -> Range<u64> {
         let frames = self.layout.frames_per_shard;
         shard.saturating_mul(frames)..shard.saturating_add(1).saturating_mul(frames)
     }
 
-    /// Where the image of a frame lies and, of a stack, the one with everything in focus.
-    pub(crate) fn images_of(&self, frame: &FrameSummary, shard: u64) -> (String, Option<String>) {
+    /// Returns the paths of the image of a frame and, for a stack, of its extended-depth-of-field image.
+    pub(crate) fn image_paths(&self, frame: &FrameSummary, shard: u64) -> (String, Option<String>) {
         self.layout.images_of(self.identity.seed, shard, frame)
     }
 
-    /// How many frames [`finish`](Self::finish) has merged; none of a data set that was only begun.
+    /// Number of frames that [`finish`](Self::finish) merged; 0 before the first merge.
     ///
     /// # Errors
     /// If the manifest cannot be read.
@@ -106,20 +112,48 @@ impl Dataset {
         Ok(Manifest::read(&self.folder)?.frames)
     }
 
-    /// Numbers of all recorded shards, in order.
+    /// Returns the numbers of all recorded shards, sorted.
     ///
     /// # Errors
-    /// If there are fewer than were merged, or the system refuses to read.
+    /// If records of merged shards are missing, or a file cannot be read.
     pub(crate) fn shards(&self) -> Result<Vec<u64>, Error> {
         let (merged, shards) = (Manifest::read(&self.folder)?.shards, recorded_shards(&self.folder)?);
         if (shards.len() as u64) < merged {
             let lost = merged - shards.len() as u64;
-            let message = format!("{lost} of {merged} shards have lost their records; `papsynth verify` says which");
+            let message = format!("missing records of shards: {lost} of {merged}; `papsynth verify` lists them");
             return Err(Error::folder(self.path(), message));
         }
         Ok(shards)
     }
 
+    /// Checks that `recipe.toml`, `model.json` and the map are those that the data set was generated from.
+    ///
+    /// # Errors
+    /// If one of them was changed after generation, is missing, or cannot be read.
+    pub fn check_inputs(&self) -> Result<(), Error> {
+        let inputs = [(names::RECIPE, &self.identity.recipe_sha256), (names::MODEL, &self.identity.model_sha256)];
+        let map = match &self.map {
+            Some(map) => Manifest::read(&self.folder)?.files.into_iter().find(|file| file.path == *map),
+            None => None,
+        };
+        let inputs = inputs.into_iter().chain(map.as_ref().map(|file| (file.path.as_str(), &file.sha256)));
+        for (name, expected) in inputs {
+            let path = self.folder.inside(name).map_err(|error| self.folder.named(error))?;
+            let found = sha256(&read::bytes(&path, INPUT_BYTES).map_err(|error| self.folder.named(error))?);
+            let message = || {
+                format!(
+                    "was changed after generation: its SHA-256 is {found:.16}…, manifest.json lists {expected:.16}…; \
+                     restore the original file"
+                )
+            };
+            if found != *expected {
+                return Err(self.folder.named(Error::input(&path)(Problem::unfit(message()))));
+            }
+        }
+        Ok(())
+    }
+
+    /// Names of the input files.
     pub(super) fn given(&self) -> impl Iterator<Item = &str> {
         [names::MODEL, names::RECIPE].into_iter().chain(self.map.as_deref())
     }

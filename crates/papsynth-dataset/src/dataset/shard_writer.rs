@@ -1,4 +1,4 @@
-//! One shard, frame by frame, plane by plane, in every format of the data set.
+//! Writing of a shard in every format of the data set, one frame and one plane at a time.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -16,15 +16,15 @@ use crate::formats::{Field, Files, Sink, names};
 use crate::truth::{Document, FrameSummary, Image, Info, Row, leaves, table, typed_columns};
 
 impl Dataset {
-    /// Writes a shard, whose frames will follow one by one.
+    /// Starts a shard. Its existing record is removed.
     ///
     /// # Errors
-    /// If the system refuses.
+    /// If a file cannot be written.
     pub fn shard_writer(&self, shard: u64) -> Result<ShardWriter<'_>, Error> {
         let folder = &self.folder;
-        // From now on the shard is not whole, whatever it was before.
+        // Without its record the shard is incomplete.
         folder.inside(names::SHARDS)?;
-        folders_are_own(self, shard)?;
+        check_folders(self, shard)?;
         folder.remove(&names::record(shard))?;
         let files = Files::new(folder, &self.layout, self.identity.seed, shard);
         let sinks = self.layout.formats.iter().map(|format| format.sink(&files)).collect::<Result<_, _>>()?;
@@ -33,70 +33,70 @@ impl Dataset {
     }
 }
 
-/// Writes the files of one shard. Frames come one after the other, planes as they arrive; neither is kept. Dropped before it is
-/// committed, it leaves no record, and the shard counts as not made.
+/// Writes the files of one shard. Frames and planes are written one after the other and not kept in memory. Dropping it
+/// before [`commit`](Self::commit) leaves an incomplete shard without a record.
 pub struct ShardWriter<'a> {
     dataset: &'a Dataset,
     shard: u64,
     files: Files<'a>,
     sinks: Vec<Box<dyn Sink + 'a>>,
     truth: TruthFiles,
-    frame: Option<Begun>,
+    frame: Option<OpenFrame>,
     done: Vec<FrameSummary>,
 }
 
-struct Begun {
+struct OpenFrame {
     frame: FrameSummary,
     saturated: Vec<Mask>,
     floored: Vec<usize>,
     /// Grey levels of a single plane.
-    picture: Vec<u16>,
+    levels: Vec<u16>,
 }
 
 struct TruthFiles {
     coco: Output,
     table: Output,
-    /// The table as Parquet, if it is wanted.
+    /// The table as Parquet, if the layout contains it.
     objects: Option<(Pending, Table<'static>)>,
     annotations: u64,
     images: Vec<Image>,
 }
 
 impl ShardWriter<'_> {
-    /// Begins the frame of a scene, whose planes will follow.
+    /// Starts the frame of a scene.
     ///
     /// # Errors
-    /// If the scene is not one of this shard or not the next one, or the system refuses.
+    /// If the frame is not in this shard, is out of order, or a file cannot be written.
     pub fn begin(&mut self, scene: &Scene) -> Result<(), Error> {
         let frame = FrameSummary::of_scene(scene);
         let (there, here) = (scene.key.seed, self.dataset.identity.seed);
-        frame.due(there == here, format!("the scene is of seed {there}, the data set of {here}"))?;
+        frame.due(there == here, format!("the seed of the scene is {there}, that of the data set {here}"))?;
         self.begin_with(frame)
     }
 
-    /// The same of a frame of the data set's seed, whatever is counted in it.
+    /// As [`begin`](Self::begin), without a check of the seed.
     pub(crate) fn begin_with(&mut self, frame: FrameSummary) -> Result<(), Error> {
         let Range { start, end } = self.dataset.frames_of_shard(self.shard);
         let follows = self.done.last().is_none_or(|last| last.index < frame.index);
-        let room = format!("shard {} has the frames {start} to {}, in this order", self.shard, end - 1);
-        frame.due((start..end).contains(&frame.index) && follows, room)?;
+        let range = format!("shard {} contains frames {start} to {} in ascending order", self.shard, end - 1);
+        frame.due((start..end).contains(&frame.index) && follows, range)?;
         if let Some(begun) = &self.frame {
             return Err(frame.wrong(format!("frame {} is not finished yet", begun.frame.index)));
         }
         let (pixels, planes) = (frame.width * frame.height, frame.planes_um.len());
-        let few = format!("the scene has {pixels} pixels and {planes} planes; at least one of each is wanted");
+        let few = format!("pixels {pixels}, planes {planes}; expected at least 1 of each");
         frame.due(pixels > 0 && planes > 0, few)?;
         for sink in &mut self.sinks {
             sink.begin(&frame, &self.files)?;
         }
-        self.frame = Some(Begun { frame, saturated: Vec::new(), floored: Vec::new(), picture: Vec::new() });
+        self.frame = Some(OpenFrame { frame, saturated: Vec::new(), floored: Vec::new(), levels: Vec::new() });
         Ok(())
     }
 
     /// Writes the next plane.
     ///
     /// # Errors
-    /// If it is not the next one or of another size than the scene, or the system refuses.
+    /// If it is not the next plane, its size differs from the scene, or a file cannot be written.
     pub fn write_plane(&mut self, plane: &Plane) -> Result<(), Error> {
         let begun = self.frame.as_mut().ok_or_else(|| not_begun(self.dataset, self.shard))?;
         begun.check_plane(plane)?;
@@ -104,41 +104,41 @@ impl ShardWriter<'_> {
             sink.plane(plane, &begun.frame, &self.files)?;
         }
         if !begun.frame.is_stack() {
-            begun.picture.clone_from(&plane.grey);
+            begun.levels.clone_from(&plane.grey);
         }
         begun.saturated.push(plane.saturated.clone());
-        begun.floored.push(plane.floored);
+        begun.floored.push(plane.clipped_px);
         Ok(())
     }
 
-    /// Writes everything else of the frame.
+    /// Ends the frame and writes its ground truth.
     ///
     /// # Errors
-    /// If planes are missing, something is of another size than the scene, or the system refuses.
+    /// If planes are missing, a size differs from the scene, or a file cannot be written.
     pub fn end(&mut self, finished: &Finished) -> Result<&FrameSummary, Error> {
-        let Begun { frame, .. } = self.frame.as_ref().ok_or_else(|| not_begun(self.dataset, self.shard))?;
+        let OpenFrame { frame, .. } = self.frame.as_ref().ok_or_else(|| not_begun(self.dataset, self.shard))?;
         let key = finished.scene.key;
         let same = key.seed == self.dataset.identity.seed && frame.is_of(&finished.scene);
-        frame.due(same, format!("the truth handed over is that of another scene, of frame {}", key.index))?;
-        let sharp = if frame.is_stack() { finished.sharp() } else { Vec::new() };
+        frame.due(same, format!("the ground truth belongs to another scene, of frame {}", key.index))?;
+        let edf = if frame.is_stack() { finished.all_in_focus_levels() } else { Vec::new() };
         if self.dataset.layout.scenes {
             self.files.write(&names::scene(key.index), finished.scene.to_json().as_bytes())?;
         }
-        self.end_with(&finished.truth, sharp)
+        self.end_with(&finished.truth, edf)
     }
 
-    /// The same with the grey levels of the picture of a stack with everything in focus.
-    pub(crate) fn end_with(&mut self, truth: &Truth, sharp: Vec<u16>) -> Result<&FrameSummary, Error> {
+    /// As [`end`](Self::end), with the grey levels of the extended-depth-of-field image of a stack.
+    pub(crate) fn end_with(&mut self, truth: &Truth, edf: Vec<u16>) -> Result<&FrameSummary, Error> {
         let begun = self.frame.take().ok_or_else(|| not_begun(self.dataset, self.shard))?;
-        begun.check(truth, &sharp)?;
-        let Begun { frame, saturated, floored, picture } = begun;
-        let picture = if sharp.is_empty() { picture } else { sharp };
+        begun.check(truth, &edf)?;
+        let OpenFrame { frame, saturated, floored, levels } = begun;
+        let levels = if edf.is_empty() { levels } else { edf };
         let Dataset { identity, layout, categories, .. } = self.dataset;
         let frame = frame.counted(truth, &saturated, floored, layout.flatten);
-        let files = self.dataset.images_of(&frame, self.shard);
+        let files = self.dataset.image_paths(&frame, self.shard);
         let document = Document::of_frame(truth, &frame, &saturated, categories, files)
-            .map_err(|category| frame.wrong(format!("the recipe knows no category `{category}`")))?;
-        let field = Field::new(identity.seed, &frame, truth, &document, &picture);
+            .map_err(|category| frame.wrong(format!("the recipe has no category `{category}`")))?;
+        let field = Field::new(identity.seed, &frame, truth, &document, &levels);
         for sink in &mut self.sinks {
             sink.field(&field, &mut self.files)?;
         }
@@ -148,10 +148,10 @@ impl ShardWriter<'_> {
         Ok(&self.done[self.done.len() - 1])
     }
 
-    /// Gives the files their names and writes, last, the record that makes the shard whole.
+    /// Renames the files to their names, then writes the record that completes the shard.
     ///
     /// # Errors
-    /// If a frame was begun and not ended, or the system refuses.
+    /// If a frame is not ended, or a file cannot be written.
     pub fn commit(self) -> Result<Vec<FrameSummary>, Error> {
         if let Some(begun) = &self.frame {
             return Err(begun.frame.wrong("is not finished"));
@@ -177,7 +177,7 @@ impl ShardWriter<'_> {
         }
         .sealed();
         let folder = &self.dataset.folder;
-        // First the files and their names, then what says that they are there.
+        // The files and their names must be on the disk before the record.
         folder.sync_names(&record.files)?;
         let name = names::record(self.shard);
         folder.sync_names([&folder.write(&name, &record.to_json())?])?;
@@ -186,8 +186,8 @@ impl ShardWriter<'_> {
     }
 }
 
-/// Where links lead outside nothing can be written: that is said while the record still stands.
-fn folders_are_own(dataset: &Dataset, shard: u64) -> Result<(), Error> {
+/// Checks the folders of a recorded shard for symbolic links before its record is removed.
+fn check_folders(dataset: &Dataset, shard: u64) -> Result<(), Error> {
     if dataset.folder.is_remote() {
         return Ok(());
     }
@@ -198,7 +198,7 @@ fn folders_are_own(dataset: &Dataset, shard: u64) -> Result<(), Error> {
 }
 
 fn not_begun(dataset: &Dataset, shard: u64) -> Error {
-    Error::Frame { index: dataset.frames_of_shard(shard).start, message: "no frame was begun".to_owned() }
+    Error::Frame { index: dataset.frames_of_shard(shard).start, message: "no frame was started".to_owned() }
 }
 
 impl TruthFiles {
@@ -249,37 +249,37 @@ impl TruthFiles {
     }
 }
 
-impl Begun {
+impl OpenFrame {
     fn check_plane(&self, plane: &Plane) -> Result<(), Error> {
         let Self { frame, saturated, .. } = self;
         let (next, planes) = (saturated.len(), frame.planes_um.len());
-        let message = format!("plane {} came where plane {next} of {planes} was due", plane.index);
+        let message = format!("found plane {}, expected plane {next} of {planes}", plane.index);
         frame.due(plane.index == next && next < planes, message)?;
         self.check_size("grey levels", plane.grey.len())?;
         self.check_size("noise-free values", plane.noise_free.len())?;
         let (brightest, bits) = (plane.grey.iter().copied().max().unwrap_or_default(), frame.bits);
-        frame.due(brightest <= white(bits), format!("grey level {brightest} does not fit into {bits} bits"))
+        frame.due(brightest <= white(bits), format!("grey level {brightest} exceeds {bits} bits"))
     }
 
-    /// Everything must fit to the scene before a file is written.
-    fn check(&self, truth: &Truth, sharp: &[u16]) -> Result<(), Error> {
+    /// Checks sizes before a file is written.
+    fn check(&self, truth: &Truth, edf: &[u16]) -> Result<(), Error> {
         let Self { frame, saturated, .. } = self;
-        let (found, due) = (saturated.len(), frame.planes_um.len());
-        frame.due(found == due, format!("{found} of {due} planes were written"))?;
+        let (found, expected) = (saturated.len(), frame.planes_um.len());
+        frame.due(found == expected, format!("planes written: {found} of {expected}"))?;
         if frame.is_stack() {
-            self.check_size("all-in-focus values", sharp.len())?;
+            self.check_size("grey levels of the extended-depth-of-field image", edf.len())?;
         }
         let ([w, h], [width, height]) = ([truth.width, truth.height], [frame.width, frame.height]);
-        let other = format!("the truth is that of {w} x {h} pixels, the image has {width} x {height}");
+        let other = format!("the ground truth is {w} x {h} px, the image {width} x {height} px");
         frame.due([w, h] == [width, height], other)?;
         let outside = truth.objects.iter().find(|object| leaves(object, width, height));
-        outside.map_or(Ok(()), |o| Err(frame.wrong(format!("the mask of object {} leaves the image", o.id))))
+        outside.map_or(Ok(()), |o| Err(frame.wrong(format!("the mask of object {} extends beyond the image", o.id))))
     }
 
     fn check_size(&self, what: &str, found: usize) -> Result<(), Error> {
         let FrameSummary { width, height, channels, .. } = self.frame;
-        let each = if channels == 1 { String::new() } else { format!(" with {channels} channels") };
-        let message = format!("{found} {what} for an image of {} pixels{each}", width * height);
-        self.frame.due(found == self.frame.values(), message)
+        let expected = self.frame.values();
+        let message = format!("{what}: found {found}, expected {width} x {height} x {channels} = {expected}");
+        self.frame.due(found == expected, message)
     }
 }

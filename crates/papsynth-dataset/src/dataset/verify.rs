@@ -1,4 +1,4 @@
-//! Whether a data set is whole to the last bit.
+//! Verification of a data set.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -9,237 +9,289 @@ use papsynth::key::STREAM_VERSION;
 use papsynth::recipe::{self, Recipe};
 use serde::Serialize;
 
-use super::contents::{Finding, Mend};
+use super::contents::{Finding, Fix};
 use super::manifest::{Entry, Manifest};
 use super::merge::{self, manifest_sha256};
 use super::record::{WRITER, read_record, recorded_shards};
-use super::set::Dataset;
+use super::set::{Dataset, INPUT_BYTES};
 use crate::bytes::sha256;
 use crate::error::Error;
-use crate::files::{Check, FileRecord, Folder, Home};
+use crate::files::{Check, FileRecord, Folder, Location};
 use crate::formats::names;
 use crate::read;
 use crate::truth::categories;
 
-/// Largest recipe that is read back.
-const GIVEN_BYTES: u64 = 1 << 28;
-
-/// What is wrong with a data set, if anything is.
+/// The result of [`verify`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Verdict {
-    /// SHA-256 of the manifest, which names every file with its own: two data sets with the same are the same. Only of one that is
-    /// whole.
+pub struct VerifyReport {
+    /// SHA-256 of the manifest, which lists the SHA-256 of every file: data sets with equal roots are equal. `None` if
+    /// there are findings.
     pub root: Option<String>,
-    /// Number of whole frames.
+    /// Number of complete frames.
     pub frames: u64,
-    /// Number of files that were read.
+    /// Number of files of the data set.
     pub files: u64,
-    /// Everything that is wrong, by path.
+    /// All findings, sorted by path.
     pub findings: Vec<Finding>,
 }
 
-/// Reads every file of a data set, compares the files of each shard with each other, and makes again what is merged of them. With `expected`, every frame of that range must be there; without, every frame up to the last.
-///
-/// # Errors
-/// If there is no data set, or the system refuses to read.
-pub fn verify(home: impl Into<Home>, expected: Option<Range<u64>>) -> Result<Verdict, Error> {
-    let home = home.into();
-    let folder = Folder::new(&home).listed()?;
-    verify_in(&folder, home, expected).map_err(|error| folder.named(error))
+/// The progress of a verification.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct VerifyProgress {
+    /// Checked shards; for a slide checked files.
+    pub done: u64,
+    /// All of them.
+    pub total: u64,
 }
 
-fn verify_in(folder: &Folder, home: Home, expected: Option<Range<u64>>) -> Result<Verdict, Error> {
+/// Verifies a data set: reads every file, checks that the files of each shard are consistent, and recomputes the merged
+/// files. With `expected`, every frame of that range must exist; otherwise every frame up to the last. Files of the
+/// desktop, such as `.DS_Store`, are ignored.
+///
+/// # Errors
+/// If there is no data set, or a file cannot be read.
+pub fn verify(location: impl Into<Location>, expected: Option<Range<u64>>) -> Result<VerifyReport, Error> {
+    verify_with_progress(location, expected, &|_| ())
+}
+
+/// As [`verify`]; calls `report` after each shard.
+///
+/// # Errors
+/// As [`verify`].
+pub fn verify_with_progress(
+    location: impl Into<Location>,
+    expected: Option<Range<u64>>,
+    report: &dyn Fn(VerifyProgress),
+) -> Result<VerifyReport, Error> {
+    let location = location.into();
+    let folder = Folder::new(&location).listed()?;
+    verify_in(&folder, location, expected, report).map_err(|error| folder.named(error))
+}
+
+fn verify_in(
+    folder: &Folder,
+    location: Location,
+    expected: Option<Range<u64>>,
+    report: &dyn Fn(VerifyProgress),
+) -> Result<VerifyReport, Error> {
     let mut findings = Vec::new();
-    let dataset = match Dataset::open(&home) {
+    let dataset = match Dataset::open(&location) {
         Ok(dataset) => Dataset { folder: folder.clone(), ..dataset },
-        // Where there is a manifest, there is a data set: its first finding is that the manifest is broken.
+        // A broken manifest is the only finding: without it, nothing else can be checked.
         Err(Error::Input { problem, path }) if path == folder.shown().join(names::MANIFEST) => {
-            let findings = vec![Finding::made_wrong(names::MANIFEST, problem.to_string())];
-            return Ok(Verdict { root: None, frames: 0, files: 1, findings });
+            let findings = vec![Finding::damaged(names::MANIFEST, problem.to_string())];
+            return Ok(VerifyReport { root: None, frames: 0, files: 1, findings });
         }
         Err(error) => return Err(error),
     };
     let manifest = folder.record(names::MANIFEST)?;
     let Manifest { writer, files: merged, frames: known, shards: closed, .. } = Manifest::read(folder)?;
     let mut listed: BTreeSet<String> = BTreeSet::from([names::MANIFEST.to_owned()]);
-    let (mut frames, mut there, mut is_damaged) = (0, Vec::new(), false);
+    let (mut frames, mut present, mut is_damaged) = (0, Vec::new(), false);
+    let mut unreadable = BTreeSet::new();
     let recorded = recorded_shards(folder)?;
     if (recorded.len() as u64) < closed {
-        // What a lost record vouched for is no stray, and what was merged was made of it.
         is_damaged = true;
-        listed.extend(names_of_lost(folder, &recorded)?);
+        // Files of a lost record are not untracked.
+        listed.extend(listed_files(folder, |shard| recorded.binary_search(&shard).is_err())?);
     }
-    for &shard in &recorded {
+    for (done, &shard) in (1..).zip(&recorded) {
         listed.insert(names::record(shard));
-        match dataset.whole_or_flaw(shard, Check::Hashes)? {
+        match dataset.record_or_finding(shard, Check::Hashes)? {
             Ok(record) => {
                 frames += record.frames.len() as u64;
-                there.extend(record.frames.iter().map(|frame| frame.index));
+                present.extend(record.frames.iter().map(|frame| frame.index));
                 folder.release(record.files.iter().map(|file| file.path.as_str()));
                 listed.extend(record.files.into_iter().map(|file| file.path));
             }
-            Err(flaw) => {
-                // What else it has is no stray, and its frames are not missing.
-                there.extend(dataset.frames_of_shard(shard));
-                if let Ok(record) = read_record(folder, shard) {
-                    listed.extend(record.files.into_iter().map(|file| file.path));
+            Err(finding) => {
+                // Its other files are not untracked, and its frames are not missing.
+                present.extend(dataset.frames_of_shard(shard));
+                match read_record(folder, shard) {
+                    Ok(record) => listed.extend(record.files.into_iter().map(|file| file.path)),
+                    Err(_) => drop(unreadable.insert(shard)),
                 }
                 is_damaged = true;
-                findings.push(flaw);
+                findings.push(finding);
             }
         }
+        report(VerifyProgress { done, total: recorded.len() as u64 });
     }
-    let expected = expected.unwrap_or_else(|| 0..there.last().map_or(0, |last: &u64| last + 1).max(known));
-    for gap in gaps(&there, &expected) {
+    if !unreadable.is_empty() {
+        listed.extend(listed_files(folder, |shard| unreadable.contains(&shard))?);
+    }
+    let expected = expected.unwrap_or_else(|| 0..present.last().map_or(0, |last: &u64| last + 1).max(known));
+    for gap in gaps(&present, &expected) {
         let message = match gap.end - gap.start {
-            1 => format!("is missing with frame {}", gap.start),
-            _ => format!("is missing with frame {}, as are all up to frame {}", gap.start, gap.end - 1),
+            1 => format!("missing: frame {}", gap.start),
+            _ => format!("missing: frames {}–{}", gap.start, gap.end - 1),
         };
-        findings.push(Finding::made_wrong(names::record(gap.start / dataset.layout.frames_per_shard), message));
+        findings.push(Finding::damaged(names::record(gap.start / dataset.layout.frames_per_shard), message));
     }
     for file in &merged {
         listed.insert(file.path.clone());
         let flaw = folder.flaw(file, Check::Hashes)?;
-        findings.extend(flaw.map(|message| Finding::made_wrong(&file.path, message)));
+        findings.extend(flaw.map(|message| Finding::damaged(&file.path, message)));
     }
     if merged.is_empty() {
         listed.extend(dataset.given().map(str::to_owned).chain(named_map(folder)));
     }
-    let given = given_flaws(&dataset, &merged)?;
-    let is_known = given.is_empty();
-    findings.extend(given);
-    // What is merged is made again and compared, and then the list of files, if all are there to make them from.
+    let inputs = input_findings(&dataset, &merged)?;
+    let inputs_match = inputs.is_empty();
+    findings.extend(inputs);
+    // The merged files and the list of files are recomputed only if all shards are complete.
     let is_closed = closed >= recorded.len() as u64 && !merged.is_empty();
-    if is_known && !is_damaged && is_closed {
+    if inputs_match && !is_damaged && is_closed {
         let found: BTreeSet<String> = findings.iter().map(|finding| finding.path.clone()).collect();
-        for flaw in merged_flaws(&dataset, &writer, &merged)? {
-            listed.insert(flaw.path.clone());
-            findings.extend((!found.contains(&flaw.path)).then_some(flaw));
+        for finding in merged_findings(&dataset, &writer, &merged)? {
+            listed.insert(finding.path.clone());
+            findings.extend((!found.contains(&finding.path)).then_some(finding));
         }
     }
     if !is_closed {
         let message = match recorded.is_empty() {
-            true => "no frame is made yet".to_owned(),
-            false => format!("{} of {} shards are merged", closed, recorded.len()),
+            true => "no frame is written yet".to_owned(),
+            false => format!("merged shards: {closed} of {}", recorded.len()),
         };
-        findings.push(Finding { path: names::MANIFEST.to_owned(), message, mend: Mend::Merge });
+        findings.push(Finding { path: names::MANIFEST.to_owned(), message, fix: Fix::Merge });
     }
     if findings.is_empty() && manifest_sha256(&dataset, &writer, &merged)? != manifest.sha256 {
-        findings.push(Finding::made_wrong(names::MANIFEST, "does not name the files that are there"));
+        findings.push(Finding::damaged(names::MANIFEST, "its list of files differs from the records of the shards"));
     }
     let files = listed.len() as u64;
+    let is_known = |path: &String| {
+        listed.contains(path) || shard_of(path, &dataset).is_some_and(|shard| unreadable.contains(&shard))
+    };
     let there = folder.names()?;
-    findings.extend(there.iter().filter(|path| !listed.contains(*path)).map(|path| Finding::stray(path, "data set")));
+    findings.extend(there.iter().filter(|path| !is_known(path)).map(|path| Finding::untracked(path, "data set")));
     findings.sort();
     let root = findings.is_empty().then_some(manifest.sha256);
-    Ok(Verdict { root, frames, files, findings })
+    Ok(VerifyReport { root, frames, files, findings })
 }
 
-/// The files that the manifest lists of shards whose records are gone, the records too.
-fn names_of_lost(folder: &Folder, recorded: &[u64]) -> Result<Vec<String>, Error> {
+/// Returns the shard that a file belongs to by its name: `images/000003.png` belongs to the shard of frame 3.
+fn shard_of(path: &str, dataset: &Dataset) -> Option<u64> {
+    const OF_FRAMES: [&str; 6] = ["images", "preview", "labels", "noise-free", "all-in-focus", "scenes"];
+    let (top, name) = path.split_once('/')?;
+    let format = dataset.layout.formats.iter().find(|format| format.name() == top);
+    let is_of_shard = [names::SHARDS, names::TABLES].contains(&top) || format.is_some_and(|format| format.is_sharded());
+    if !is_of_shard && format.is_none() && !OF_FRAMES.contains(&top) {
+        return None;
+    }
+    // Numbers of frames and shards have at least 6 digits.
+    let numbers = name.split(|c: char| !c.is_ascii_digit()).filter(|digits| digits.len() >= 6);
+    let number: u64 = numbers.last()?.parse().ok()?;
+    Some(if is_of_shard { number } else { number / dataset.layout.frames_per_shard })
+}
+
+/// Returns the files, with the record, that the manifest lists for selected shards.
+fn listed_files(folder: &Folder, is_selected: impl Fn(u64) -> bool) -> Result<Vec<String>, Error> {
     let path = folder.inside(names::MANIFEST)?;
     let failed = |e| Error::io("read", &path)(e);
     let mut names = Vec::new();
-    // A file a line.
+    // One file a line.
     for line in BufReader::new(File::open(&path).map_err(failed)?).lines() {
         let line = line.map_err(failed)?;
         let entry = line.strip_suffix(',').or(line.strip_suffix("]}")).unwrap_or(&line);
         let Ok(entry) = serde_json::from_str::<Entry>(entry) else { continue };
-        if entry.shard.is_some_and(|shard| recorded.binary_search(&shard).is_err()) {
+        if entry.shard.is_some_and(&is_selected) {
             names.push(entry.path);
         }
     }
     Ok(names)
 }
 
-/// What is wrong with the files that the data set was begun with, and with what the manifest says of them.
-fn given_flaws(dataset: &Dataset, merged: &[FileRecord]) -> Result<Vec<Finding>, Error> {
+/// Checks the input files (recipe, model, map) and their entries in the manifest.
+fn input_findings(dataset: &Dataset, merged: &[FileRecord]) -> Result<Vec<Finding>, Error> {
     let folder = &dataset.folder;
     let record = |name: &str| merged.iter().find(|file| file.path == name);
-    let mut flaws = Vec::new();
+    let mut findings = Vec::new();
     let identity = &dataset.identity;
     for (name, sha256) in [(names::RECIPE, &identity.recipe_sha256), (names::MODEL, &identity.model_sha256)] {
-        // A data set that was only begun lists none; of one that is merged, none is left out.
+        // The manifest lists them after a merge.
         let is_it = match merged.is_empty() {
             true => folder.has(name)? && folder.record(name)?.sha256 == *sha256,
             false => record(name).is_some_and(|file| file.sha256 == *sha256),
         };
         if !is_it {
-            flaws.push(Finding::made_wrong(name, "is not what the manifest says the data set is made from"));
+            findings.push(Finding::damaged(name, "changed: the SHA-256 differs from the one in manifest.json"));
         }
     }
-    if !flaws.is_empty() || merged.is_empty() || identity.stream_version != STREAM_VERSION {
-        return Ok(flaws);
+    if !findings.is_empty() || merged.is_empty() || identity.stream_version != STREAM_VERSION {
+        return Ok(findings);
     }
-    // Of these streams the recipe is one that this program reads: what there may be in the images follows from it.
+    // A recipe of this stream version can be read; the categories follow from it.
     let path = folder.inside(names::RECIPE)?;
-    let text = match read::bytes(&path, GIVEN_BYTES) {
+    let text = match read::bytes(&path, INPUT_BYTES) {
         Ok(text) if sha256(&text) == identity.recipe_sha256 => text,
-        // It is missing or damaged, which has been found already.
-        Ok(_) | Err(Error::Input { .. }) => return Ok(flaws),
+        // It is missing or damaged, which is a finding already.
+        Ok(_) | Err(Error::Input { .. }) => return Ok(findings),
         Err(failure) => return Err(failure),
     };
     let Ok(recipe) = Recipe::from_toml(&String::from_utf8_lossy(&text)) else {
-        flaws.push(Finding::made_wrong(names::RECIPE, "is no recipe that this program reads"));
-        return Ok(flaws);
+        findings.push(Finding::damaged(names::RECIPE, "not a valid recipe"));
+        return Ok(findings);
     };
     if dataset.categories != categories(&recipe) {
-        flaws.push(Finding::made_wrong(names::MANIFEST, "names other categories than the recipe gives"));
+        findings.push(Finding::damaged(names::MANIFEST, "its categories differ from those of the recipe"));
     }
     let named = map_of(&recipe);
     match (named, &dataset.map) {
-        (Some(named), None) => flaws.push(Finding::made_wrong(named, "is missing from the list of files")),
-        (_, Some(kept)) if named != Some(kept) => {
-            flaws.push(Finding::made_wrong(kept, "follows neither from recipe nor from shards"));
+        (Some(named), None) => {
+            findings.push(Finding::damaged(named, "missing from the list of files in manifest.json"))
         }
-        // The name of a map begins with the hash of its content.
+        (_, Some(kept)) if named != Some(kept) => {
+            findings.push(Finding::damaged(kept, "listed in manifest.json, but not written by papsynth"));
+        }
+        // The name of a map contains the first digits of its SHA-256.
         (Some(named), Some(_))
             if record(named).is_some_and(|file| !named.contains(&format!("{:.16}", file.sha256))) =>
         {
-            flaws.push(Finding::made_wrong(named, "is another map than the recipe names"));
+            findings.push(Finding::damaged(named, "not the map that the recipe names"));
         }
         _ => {}
     }
-    Ok(flaws)
+    Ok(findings)
 }
 
+/// Returns the map that a recipe names.
 fn map_of(recipe: &Recipe) -> Option<&String> {
     match &recipe.layout {
-        recipe::Layout::Map { path } | recipe::Layout::Labels(recipe::Labels { path, .. }) => Some(path),
+        recipe::Layout::DensityMap { path } | recipe::Layout::Labels(recipe::Labels { path, .. }) => Some(path),
         _ => None,
     }
 }
 
-/// The map that the recipe in a folder names, if there is a recipe that this program reads.
+/// Returns the map that the recipe in a folder names, if the recipe is valid.
 fn named_map(folder: &Folder) -> Option<String> {
-    let text = read::bytes(&folder.inside(names::RECIPE).ok()?, GIVEN_BYTES).ok()?;
+    let text = read::bytes(&folder.inside(names::RECIPE).ok()?, INPUT_BYTES).ok()?;
     map_of(&Recipe::from_toml(&String::from_utf8_lossy(&text)).ok()?).cloned()
 }
 
-/// Merged files that are not as the shards make them.
-fn merged_flaws(dataset: &Dataset, writer: &str, merged: &[FileRecord]) -> Result<Vec<Finding>, Error> {
+/// Returns the merged files that differ from those computed from the shards.
+fn merged_findings(dataset: &Dataset, writer: &str, merged: &[FileRecord]) -> Result<Vec<Finding>, Error> {
     let given: Vec<&str> = dataset.given().collect();
     let given = merged.iter().filter(|file| given.contains(&file.path.as_str())).cloned().collect();
     let expected = merge::expected(dataset, writer, given)?;
-    let mut flaws = Vec::new();
+    let mut findings = Vec::new();
     for file in &expected {
-        // The words of a card and the bytes of what is compressed are those of one program.
+        // Texts and compressed bytes depend on the release that wrote them.
         let of_program = [names::CARD, names::CROISSANT, names::SHEET, names::OBJECTS, names::HUGGINGFACE_CARD];
         let is_ours = writer == WRITER || !of_program.contains(&file.path.as_str());
         let message = match merged.iter().find(|found| found.path == file.path) {
             Some(found) if found == file || !is_ours => continue,
-            Some(_) => "is not what the shards make it",
-            None => "is missing from the list of files",
+            Some(_) => "differs from the shards",
+            None => "missing from the list of files in manifest.json",
         };
-        flaws.push(Finding::made_wrong(&file.path, message));
+        findings.push(Finding::damaged(&file.path, message));
     }
     for file in merged.iter().filter(|file| expected.iter().all(|expected| expected.path != file.path)) {
-        flaws.push(Finding::made_wrong(&file.path, "follows neither from recipe nor from shards"));
+        findings.push(Finding::damaged(&file.path, "listed in manifest.json, but not written by papsynth"));
     }
-    Ok(flaws)
+    Ok(findings)
 }
 
-/// The parts of a range that are not among these indices, which are sorted.
+/// Returns the parts of a range that contain none of the sorted indices.
 fn gaps(there: &[u64], expected: &Range<u64>) -> Vec<Range<u64>> {
     let mut gaps = Vec::new();
     let mut next = expected.start;
@@ -257,7 +309,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn gaps_are_what_is_not_there() {
+    fn gaps_are_the_missing_ranges() {
         assert_eq!(gaps(&[1, 2, 5, 9], &(0..8)), [0..1, 3..5, 6..8]);
         assert_eq!(gaps(&[3], &(3..6)).first(), Some(&(4..6)));
         assert!(gaps(&[0, 1], &(0..2)).is_empty() && gaps(&[], &(0..0)).is_empty());

@@ -1,14 +1,15 @@
-//! Data sets in object stores: Amazon S3 and what speaks its protocol (`s3://bucket/prefix`), Google Cloud Storage (`gs://bucket/prefix`), Azure
-//! Blob Storage (`az://container/prefix`).
+//! Data sets in object stores: Amazon S3 and compatible stores (`s3://bucket/prefix`), Google Cloud Storage
+//! (`gs://bucket/prefix`), Azure Blob Storage (`az://container/prefix`).
 //!
-//! Each file of a data set is one object, put whole: there is nothing to rename, and a shard's record is put after the files it vouches for. What
-//! fails for a moment is tried again for three minutes.
+//! Each file of a data set is one object. The record of a shard is uploaded after the files that it lists. Transient
+//! failures are retried for three minutes.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::hash::{BuildHasher, RandomState};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use futures_util::TryStreamExt;
 use object_store::path::Path as Key;
@@ -19,10 +20,10 @@ use url::Url;
 use super::store::Store;
 use crate::error::Error;
 
-/// Larger files are put in parts of this size, which are joined when all are there.
+/// Larger files are uploaded in parts of this size.
 const PART_BYTES: usize = 16 << 20;
 
-/// A place in a bucket, below which the files of one data set lie.
+/// A prefix in a bucket that contains the files of one data set.
 #[derive(Debug)]
 pub struct Bucket {
     url: String,
@@ -33,27 +34,30 @@ pub struct Bucket {
 }
 
 impl Bucket {
-    /// The place that an address such as `s3://bucket/prefix` names, with keys and endpoint from the environment. Nothing is asked of
-    /// the store yet.
+    /// Opens an address such as `s3://bucket/prefix`, with credentials and endpoint from the environment. Sends no
+    /// request.
     ///
     /// # Errors
-    /// If it is no such address, or the environment lacks what the store wants.
+    /// If the address is invalid, the environment lacks settings of the store, or the system clock is before 1970.
     pub fn open(address: &str) -> Result<Self, Error> {
+        if before_1970() {
+            return Err(Error::folder(Path::new(address), "the system clock is before 1970; set the date"));
+        }
         let wrong = |message: String| Error::Folder { path: PathBuf::from(address), message };
         let expected = "expected s3://bucket/prefix, gs://bucket/prefix or az://container/prefix";
-        let url = Url::parse(address).map_err(|e| wrong(format!("is no address ({e}); {expected}")))?;
+        let url = Url::parse(address).map_err(|e| wrong(format!("invalid address ({e}); {expected}")))?;
         if url.query().is_some() || url.fragment().is_some() || !url.username().is_empty() || url.password().is_some() {
             return Err(wrong(format!(
-                "has more than a bucket and a prefix; {expected}, with keys in the environment"
+                "credentials, query or fragment in the address; {expected}, with credentials in the environment"
             )));
         }
         let own = match ObjectStoreScheme::parse(&url) {
             Ok((ObjectStoreScheme::AmazonS3, _)) => "aws_",
             Ok((ObjectStoreScheme::GoogleCloudStorage, _)) => "google_",
             Ok((ObjectStoreScheme::MicrosoftAzure, _)) => "azure_",
-            _ => return Err(wrong(format!("is no object store that is known here; {expected}"))),
+            _ => return Err(wrong(format!("unsupported object store; {expected}"))),
         };
-        // Only the first call in a process has an effect, and all ask for the same.
+        // Only the first call in a process has an effect.
         let _ = rustls::crypto::ring::default_provider().install_default();
         let variables = std::env::vars_os().filter_map(|(name, value)| {
             let (name, value) = (name.into_string().ok()?.to_ascii_lowercase(), value.into_string().ok()?);
@@ -61,7 +65,7 @@ impl Bucket {
         });
         let (store, folder) = object_store::parse_url_opts(&url, variables).map_err(|e| wrong(e.to_string()))?;
         if folder.as_ref().is_empty() {
-            return Err(wrong(format!("is a whole bucket; a data set wants a prefix of its own: {expected}")));
+            return Err(wrong(format!("the prefix is missing; {expected}")));
         }
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
         let runtime = runtime.map_err(|source| Error::Io { action: "read", path: PathBuf::from(address), source })?;
@@ -81,7 +85,7 @@ impl Bucket {
             if part.is_empty() {
                 break;
             }
-            // Two parts on their way, one at hand: memory stays bounded.
+            // Two parts in flight and one being read bound the memory.
             upload.wait_for_capacity(2).await.map_err(failed)?;
             upload.put(part.into());
         }
@@ -96,18 +100,18 @@ impl Store for Bucket {
 
     fn size(&self, name: &str) -> io::Result<Option<u64>> {
         let key = self.key(name)?;
-        there(self.runtime.block_on(self.store.head(&key)).map(|found| found.size))
+        found(self.runtime.block_on(self.store.head(&key)).map(|found| found.size))
     }
 
     fn get(&self, name: &str, to: &Path) -> io::Result<bool> {
         let key = self.key(name)?;
-        // A copy gets its name when all of it is there.
+        // The copy gets its name when it is complete.
         let unique = RandomState::new().hash_one(to);
         let partial = to.with_extension(format!("{unique:016x}.tmp"));
         let copied = self.runtime.block_on(async {
-            let Some(found) = there(self.store.get(&key).await)? else { return Ok(false) };
+            let Some(object) = found(self.store.get(&key).await)? else { return Ok(false) };
             let mut file = File::create(&partial)?;
-            let mut pieces = found.into_stream();
+            let mut pieces = object.into_stream();
             while let Some(piece) = pieces.try_next().await.map_err(failed)? {
                 file.write_all(&piece)?;
             }
@@ -117,7 +121,7 @@ impl Store for Bucket {
             Ok(true) => fs::rename(&partial, to).map(|()| true),
             Ok(false) => Ok(false),
             Err(error) => {
-                // What stays behind lies in the folder for temporary files.
+                // A file that cannot be removed stays in the folder for temporary files.
                 let _ = fs::remove_file(&partial);
                 Err(error)
             }
@@ -137,7 +141,7 @@ impl Store for Bucket {
 
     fn remove(&self, name: &str) -> io::Result<()> {
         let key = self.key(name)?;
-        there(self.runtime.block_on(self.store.delete(&key))).map(drop)
+        found(self.runtime.block_on(self.store.delete(&key))).map(drop)
     }
 
     fn list(&self, folder: &str) -> io::Result<BTreeMap<String, u64>> {
@@ -156,12 +160,17 @@ impl Store for Bucket {
     }
 }
 
+#[expect(clippy::disallowed_methods, reason = "signing requests panics on such a clock; it reaches no image")]
+fn before_1970() -> bool {
+    SystemTime::now() < SystemTime::UNIX_EPOCH
+}
+
 fn failed(error: StoreError) -> io::Error {
     io::Error::other(error)
 }
 
-/// What was found; none if there is no such object.
-fn there<T>(found: Result<T, StoreError>) -> io::Result<Option<T>> {
+/// Turns "not found" into `None`.
+fn found<T>(found: Result<T, StoreError>) -> io::Result<Option<T>> {
     match found {
         Ok(found) => Ok(Some(found)),
         Err(StoreError::NotFound { .. }) => Ok(None),
@@ -174,7 +183,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_no_place_in_a_bucket_is_refused_with_what_would_be() {
+    fn invalid_addresses_are_refused_with_the_expected_form() {
         for address in
             ["ftp://host/a", "s3:///a", "s3://bucket", "s3://bucket/", "s3://key:secret@bucket/a", "s3://bucket/a?b=c"]
         {
@@ -184,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_in_a_bucket_is_opened_without_a_word_to_the_store() {
+    fn opening_an_address_sends_no_request() {
         let bucket = Bucket::open("s3://bucket/some/prefix/").unwrap();
         assert_eq!(bucket.url(), "s3://bucket/some/prefix");
         assert_eq!(bucket.key("shards/000000.json").unwrap().as_ref(), "some/prefix/shards/000000.json");

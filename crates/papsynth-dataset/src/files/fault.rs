@@ -1,10 +1,10 @@
-//! Failures of the disk, made on purpose: every call that touches it passes a point.
+//! Injected failures of the disk for tests: every call that accesses the disk passes a fault point.
 
 #[cfg(test)]
 thread_local! {
-    /// Points that are still passed without harm; none set, all are.
+    /// Fault points that still succeed; `None`: all succeed.
     pub(crate) static LEFT: std::cell::Cell<Option<usize>> = const { std::cell::Cell::new(None) };
-    /// How the next one fails: full disk, refused, broken.
+    /// Error kind of the next failure.
     pub(crate) static KIND: std::cell::Cell<std::io::ErrorKind> = const { std::cell::Cell::new(std::io::ErrorKind::StorageFull) };
 }
 
@@ -19,7 +19,7 @@ pub(crate) fn sync(file: &std::fs::File) -> std::io::Result<()> {
     file.sync_all()
 }
 
-/// No power will fail in a test, and the disk is slow.
+/// Tests skip the slow sync.
 #[cfg(test)]
 pub(crate) fn sync(_: &std::fs::File) -> std::io::Result<()> {
     point()
@@ -29,7 +29,7 @@ pub(crate) fn sync(_: &std::fs::File) -> std::io::Result<()> {
 pub(crate) fn point() -> std::io::Result<()> {
     LEFT.with(|left| match left.get() {
         None => Ok(()),
-        Some(0) => Err(std::io::Error::new(KIND.get(), "on purpose")),
+        Some(0) => Err(std::io::Error::new(KIND.get(), "injected failure")),
         Some(n) => {
             left.set(Some(n - 1));
             Ok(())
@@ -37,8 +37,9 @@ pub(crate) fn point() -> std::io::Result<()> {
     })
 }
 
-/// Makes something with `make` while the disk fails at one call after the other, every call of the beginning and then a choice: whatever happens,
-/// no file is partial but those that `may_change`, the error names the folder, and the next run completes it. Gives how often the disk failed.
+/// Runs `make` repeatedly; in each run the disk fails at another call: at each of the `first` calls, then at every
+/// seventh. Checks that no file is partial except `may_change`, that the error names the folder, and that the next run
+/// completes the output. Returns the number of failures.
 #[cfg(test)]
 pub(crate) fn everywhere<T: std::fmt::Debug>(
     name: &str,
@@ -69,5 +70,5 @@ pub(crate) fn everywhere<T: std::fmt::Debug>(
         make(scratch.path()).unwrap();
         assert_eq!(contents(scratch.path()), expected, "after {passed} calls");
     }
-    unreachable!("a run has an end")
+    unreachable!("a run ends")
 }

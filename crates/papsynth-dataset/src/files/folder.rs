@@ -1,4 +1,4 @@
-//! Whole files or none: a file gets its name only when all of it is on the disk.
+//! A folder whose files are written atomically: a file gets its name when it is complete on the disk.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -7,24 +7,24 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::fault;
-use super::pending::{FileRecord, Output, Pending, is_temporary};
-use super::store::{Home, Remote};
+use super::pending::{FileRecord, Output, Pending, is_desktop_file, is_temporary};
+use super::store::{Location, Remote};
 use crate::bytes::measure;
 use crate::error::{Error, Problem};
 
-/// How carefully files are looked at.
+/// The extent of a check of files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Check {
-    /// They are there and of the right size.
+    /// Existence and size.
     Sizes,
-    /// Their SHA-256 is right, too; all are read.
+    /// Existence, size and SHA-256; all files are read.
     Hashes,
 }
 
-/// Writes a file under a temporary name in the same folder, brings it to the disk, and renames it.
+/// Writes a file atomically: under a temporary name in the same folder, then synced to the disk and renamed.
 ///
 /// # Errors
-/// If there is a folder of that name, or the system refuses; then there is no such file, or still the former one.
+/// If the path is a folder or cannot be written. An existing file is then unchanged.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     if path.is_dir() {
         return Err(Error::io("write", path)(io::ErrorKind::IsADirectory.into()));
@@ -34,7 +34,7 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     Folder::new(folder).write(&name, bytes).map(|_| ())
 }
 
-/// What lies in a folder; nothing if it is not there.
+/// Returns the entries of a folder; none if it does not exist.
 fn entries(path: &Path) -> Result<Vec<fs::DirEntry>, Error> {
     match fs::read_dir(path) {
         Ok(entries) => entries.collect::<Result<_, _>>().map_err(Error::io("read", path)),
@@ -43,23 +43,28 @@ fn entries(path: &Path) -> Result<Vec<fs::DirEntry>, Error> {
     }
 }
 
+/// Returns the part of a name after the last `/`.
+pub(crate) fn last_part(name: &str) -> &str {
+    name.rsplit('/').next().unwrap_or(name)
+}
+
 fn is_absent(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory)
 }
 
-/// A folder into which files are written by names relative to it, with `/` between folders. Of a data set in an object store it is where
-/// its files are worked on: what gets its name is put into the store, and what is read is copied from there first.
+/// A folder whose files have relative names with `/` between folders. For a data set in an object store this is the
+/// local folder of copies: committed files are uploaded, and files are downloaded before they are read.
 #[derive(Debug, Clone)]
 pub(crate) struct Folder {
     root: PathBuf,
     remote: Option<Arc<Remote>>,
-    /// Names and sizes of the files in the store at one moment.
+    /// Names and sizes of the files in the store at one point in time.
     listing: Option<Arc<BTreeMap<String, u64>>>,
 }
 
 impl Folder {
-    pub(crate) fn new(home: impl Into<Home>) -> Self {
-        let Home { root, remote } = home.into();
+    pub(crate) fn new(location: impl Into<Location>) -> Self {
+        let Location { root, remote } = location.into();
         Self { root, remote, listing: None }
     }
 
@@ -67,18 +72,18 @@ impl Folder {
         &self.root
     }
 
-    /// Where it is, for messages.
+    /// The folder or address, for messages.
     pub(crate) fn shown(&self) -> PathBuf {
         self.remote.as_ref().map_or_else(|| self.root.clone(), |remote| remote.named(&self.root))
     }
 
-    /// The same folder, with the sizes of all files in the store asked for once instead of one by one.
+    /// Returns this folder with the sizes of all files in the store, requested at once instead of one by one.
     pub(crate) fn listed(&self) -> Result<Self, Error> {
         let listing = self.remote.as_ref().map(|remote| remote.list("")).transpose()?.map(Arc::new);
         Ok(Self { listing, ..self.clone() })
     }
 
-    /// An error that names files in the store, and not their copies.
+    /// Returns the error with addresses in the store instead of paths of local copies.
     pub(crate) fn named(&self, error: Error) -> Error {
         let Some(remote) = &self.remote else { return error };
         match error {
@@ -119,10 +124,10 @@ impl Folder {
         }
     }
 
-    /// The copies of these files are wanted no longer.
+    /// Removes the local copies of these files.
     pub(crate) fn release<'n>(&self, names: impl IntoIterator<Item = &'n str>) {
         if self.remote.is_some() {
-            // One that cannot be removed goes with the folder.
+            // A copy that cannot be removed is removed with the folder.
             names.into_iter().for_each(|name| drop(fs::remove_file(self.path(name))));
         }
     }
@@ -131,7 +136,10 @@ impl Folder {
         self.root.join(name)
     }
 
-    /// The path of a file that is read or written: neither it nor a folder on the way is a link, which could lead outside.
+    /// Returns the path of a file to be read or written.
+    ///
+    /// # Errors
+    /// If the path contains a symbolic link, which could point outside the folder.
     pub(crate) fn inside(&self, name: &str) -> Result<PathBuf, Error> {
         self.no_link(name)?;
         if let Some(remote) = &self.remote
@@ -142,7 +150,7 @@ impl Folder {
         Ok(self.path(name))
     }
 
-    /// Neither a file or folder nor a folder on the way to it is a link.
+    /// Checks that a path contains no symbolic link.
     pub(crate) fn no_link(&self, name: &str) -> Result<(), Error> {
         let mut path = self.root.clone();
         for part in name.split('/') {
@@ -150,7 +158,6 @@ impl Folder {
             match fs::symlink_metadata(&path) {
                 Ok(found) if found.is_symlink() => return Err(Error::input(&path)(Problem::Link)),
                 Ok(_) => {}
-                // What is not there leads nowhere.
                 Err(_) => break,
             }
         }
@@ -161,13 +168,13 @@ impl Folder {
         self.pending(name)?.write_whole(bytes)
     }
 
-    /// Writes a whole file, unless there is one of the same content.
+    /// Writes a file unless it exists with the same content.
     pub(crate) fn keep(&self, name: &str, bytes: &[u8]) -> Result<FileRecord, Error> {
         let record = FileRecord::of(name, bytes);
         if self.flaw(&record, Check::Hashes)?.is_none() { Ok(record) } else { self.write(name, bytes) }
     }
 
-    /// Writes a file piece by piece, unless there is one of the same content.
+    /// Writes a file in pieces unless it exists with the same content.
     pub(crate) fn write_if_new(
         &self,
         name: &str,
@@ -181,13 +188,14 @@ impl Folder {
         Ok(record)
     }
 
-    /// Writes a file unless there is one of that name. Says whether it did; of two that try at once one does, but in an object store.
-    pub(crate) fn write_unless_there(
+    /// Writes a file unless one of that name exists, and returns whether it was written. If two processes try at once,
+    /// one of them writes, except in an object store.
+    pub(crate) fn write_new(
         &self,
         name: &str,
         fill: impl FnOnce(&mut Output) -> Result<(), Error>,
     ) -> Result<bool, Error> {
-        self.filled(name, fill)?.commit_unless_there()
+        self.filled(name, fill)?.commit_new()
     }
 
     fn filled(&self, name: &str, fill: impl FnOnce(&mut Output) -> Result<(), Error>) -> Result<Pending, Error> {
@@ -196,17 +204,18 @@ impl Folder {
         output.into_pending()
     }
 
-    /// Opens a file that will have this name once it is committed.
+    /// Creates a temporary file. Its commit gives it this name.
     pub(crate) fn pending(&self, name: &str) -> Result<Pending, Error> {
-        // A link that has the name itself is replaced, and not followed.
+        // A symbolic link of this name is replaced and not followed.
         if let Some((folders, _)) = name.rsplit_once('/') {
             self.inside(folders)?;
         }
         Pending::open(self.path(name), name, self.remote.clone())
     }
 
+    /// Compares a file with its record and returns the difference.
     pub(crate) fn flaw(&self, record: &FileRecord, check: Check) -> Result<Option<String>, Error> {
-        let missing = || Ok(Some("is missing".to_owned()));
+        let missing = || Ok(Some("missing".to_owned()));
         if self.remote.is_some() {
             match self.size(&record.path)? {
                 None => return missing(),
@@ -220,20 +229,20 @@ impl Folder {
         };
         let size = match fs::metadata(&path) {
             Ok(found) if found.is_file() => found.len(),
-            Ok(_) => return Ok(Some("is no file".to_owned())),
+            Ok(_) => return Ok(Some("not a file".to_owned())),
             Err(e) if is_absent(&e) => return missing(),
             Err(e) => return Err(Error::io("read", &path)(e)),
         };
         Ok(if size != record.bytes {
-            Some(format!("has {size} bytes, not {}", record.bytes))
+            Some(format!("has {size} bytes; expected {}", record.bytes))
         } else if check == Check::Hashes && self.record(&record.path)?.sha256 != record.sha256 {
-            Some("has another content than it was written with".to_owned())
+            Some("changed: the SHA-256 differs".to_owned())
         } else {
             None
         })
     }
 
-    /// The first of these files of which something is wrong, and what.
+    /// Returns the path of the first file that differs from its record, and the difference.
     pub(crate) fn first_flaw<'f>(
         &self,
         files: &'f [FileRecord],
@@ -254,7 +263,7 @@ impl Folder {
         Ok(FileRecord { path: name.to_owned(), bytes, sha256 })
     }
 
-    /// Every folder from the root down, but none that a link leads to.
+    /// Returns the root and all its subfolders. Symbolic links are not followed.
     pub(crate) fn folders(&self) -> Result<Vec<PathBuf>, Error> {
         let mut found = vec![self.root.clone()];
         let mut next = 0;
@@ -269,27 +278,30 @@ impl Folder {
         Ok(found)
     }
 
-    /// Removes folders in which there is nothing, or only such folders. The root stays, and so does what the system keeps.
+    /// Removes all empty subfolders. Folders that cannot be removed stay.
     pub(crate) fn remove_empty(&self) -> Result<(), Error> {
-        // From the inmost: what lies within a folder comes after it.
+        // Subfolders come after their parent: the reverse order removes them first.
         self.folders()?.iter().skip(1).rev().for_each(|path| drop(fs::remove_dir(path)));
         Ok(())
     }
 
-    /// Every file, by its name, in order. Links are files: nothing of ours is one.
+    /// Returns the names of all files, sorted, without those of the desktop ([`is_desktop_file`]). Symbolic links count
+    /// as files.
     pub(crate) fn names(&self) -> Result<Vec<String>, Error> {
         if let Some(remote) = &self.remote {
-            return Ok(remote.list("")?.into_keys().collect());
+            let names = remote.list("")?.into_keys();
+            return Ok(names.filter(|name| !is_desktop_file(last_part(name))).collect());
         }
         let mut found = Vec::new();
         for path in self.folders()? {
             for entry in entries(&path)? {
-                if entry.file_type().map_err(Error::io("read", &path))?.is_dir() {
+                let is_folder = entry.file_type().map_err(Error::io("read", &path))?.is_dir();
+                if is_folder || is_desktop_file(&entry.file_name().to_string_lossy()) {
                     continue;
                 }
                 let below = entry.path();
                 let below = below.strip_prefix(&self.root);
-                let below = below.expect("what is found in folders from the root down lies below it");
+                let below = below.expect("entries of subfolders are below the root");
                 let parts: Vec<_> = below.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect();
                 found.push(parts.join("/"));
             }
@@ -298,15 +310,15 @@ impl Folder {
         Ok(found)
     }
 
-    /// Last parts of the names of the files that lie in a folder itself; none if there is no such folder.
+    /// Returns the file names in a folder, without those of subfolders; none if the folder does not exist.
     pub(crate) fn names_in(&self, folder: &str) -> Result<Vec<String>, Error> {
         if let Some(remote) = &self.remote {
-            let asked;
+            let requested;
             let found = match &self.listing {
                 Some(listing) => &**listing,
                 None => {
-                    asked = remote.list(folder)?;
-                    &asked
+                    requested = remote.list(folder)?;
+                    &requested
                 }
             };
             let below = format!("{folder}/");
@@ -324,38 +336,37 @@ impl Folder {
         entries.map(name).collect::<Result<_, _>>().map_err(Error::io("read", &path))
     }
 
-    /// Removes what killed processes left behind and says how many files went and how many stayed: a temporary file that somebody works on
-    /// is locked, and somebody else's may not be opened.
+    /// Removes temporary files of killed processes. Returns the number of removed and of skipped files. Skipped are
+    /// files that another process has locked or that may not be opened.
     pub(crate) fn sweep(&self) -> Result<[u64; 2], Error> {
-        let [mut removed, mut stayed] = [0; 2];
+        let [mut removed, mut skipped] = [0; 2];
         for path in self.folders()? {
             for entry in entries(&path)? {
                 if !is_temporary(&entry.file_name().to_string_lossy()) {
                     continue;
                 }
-                // A link is nobody's work, and what it leads to is none of ours.
+                // A symbolic link is removed without opening its target.
                 let is_link = entry.file_type().is_ok_and(|kind| kind.is_symlink());
                 let open =
                     || File::options().write(true).open(entry.path()).ok().filter(|file| file.try_lock().is_ok());
-                // The lock is held until the file is removed, so that no other process can take the file in between.
+                // The lock is held until the file is removed, so that no other process can lock it in between.
                 let lock = if is_link { None } else { open() };
                 let is_gone = (is_link || lock.is_some()) && fs::remove_file(entry.path()).is_ok();
                 removed += u64::from(is_gone);
-                // Gone by another's hand is as good.
-                stayed += u64::from(!is_gone && entry.path().symlink_metadata().is_ok());
+                skipped += u64::from(!is_gone && entry.path().symlink_metadata().is_ok());
             }
         }
-        Ok([removed, stayed])
+        Ok([removed, skipped])
     }
 
-    /// Brings the names of these files to the disk: what is recorded afterwards is there even if the power fails.
+    /// Syncs the folders of these files, so that their names survive a power failure.
     pub(crate) fn sync_names<'f>(&self, files: impl IntoIterator<Item = &'f FileRecord>) -> Result<(), Error> {
         let mut folders: Vec<PathBuf> =
             files.into_iter().filter_map(|file| self.path(&file.path).parent().map(Path::to_owned)).collect();
         folders.sort_unstable();
         folders.dedup();
         folders.iter().try_for_each(|folder| {
-            // Not every system opens a folder; one that does must bring it to the disk.
+            // Not every system can open a folder.
             match File::open(folder) {
                 Ok(opened) => fault::sync(&opened).map_err(Error::io("write", folder)),
                 Err(_) => Ok(()),

@@ -1,4 +1,4 @@
-//! Whole files or none, in folders and object stores.
+//! Atomic writes of files in folders and object stores.
 
 #[cfg(feature = "cloud")]
 mod cloud;
@@ -9,21 +9,23 @@ mod store;
 
 #[cfg(feature = "cloud")]
 pub use cloud::Bucket;
-pub(crate) use folder::Folder;
 pub use folder::{Check, write_file};
+pub(crate) use folder::{Folder, last_part};
 pub use pending::FileRecord;
-pub(crate) use pending::{Handle, Output, Pending, is_temporary};
-pub use store::{Home, Store};
+pub(crate) use pending::{Handle, Output, Pending, is_desktop_file, is_temporary};
+pub use store::{Location, Store};
 
 use std::path::Path;
 
 use crate::error::Error;
 
-impl Home {
-    /// The home of a data set at a path, or at an address such as `s3://bucket/prefix` in a build with the feature `cloud`.
+impl Location {
+    /// The location of a data set at a path, or at an address such as `s3://bucket/prefix` in a build with the feature
+    /// `cloud`.
     ///
     /// # Errors
-    /// If an address names no object store, this build lacks the feature `cloud`, or the folder for temporary files cannot be made.
+    /// If an address is not that of an object store, this build lacks the feature `cloud`, or the folder for temporary
+    /// files cannot be created.
     pub fn at(path: &Path) -> Result<Self, Error> {
         if !Self::is_address(path) {
             return Ok(Self::from(path));

@@ -1,4 +1,4 @@
-//! A file that is being written: whole under its name, or not at all.
+//! Atomic writes: a file appears complete under its name, or not at all.
 
 use std::fs::{self, File, TryLockError};
 use std::hash::{BuildHasher, RandomState};
@@ -33,15 +33,21 @@ impl FileRecord {
 
 const TEMPORARY_ENDING: &str = ".tmp";
 
-/// Temporary files that are made for one file, until one is neither locked nor removed by another process.
-const MOST_ATTEMPTS: u32 = 16;
+/// Largest number of temporary files tried for one file, until one is neither locked nor removed by another process.
+const MAX_ATTEMPTS: u32 = 16;
 
-/// Whether a file of this name is one that was never finished.
+/// Whether this is the name of a temporary file.
 pub(crate) fn is_temporary(name: &str) -> bool {
     name.starts_with('.') && name.ends_with(TEMPORARY_ENDING)
 }
 
-/// A file without its name yet. Dropped before it is committed, it vanishes.
+/// Whether the desktop of macOS or Windows writes files of this name into folders that it shows.
+pub(crate) fn is_desktop_file(name: &str) -> bool {
+    let is = |known: &str| name.eq_ignore_ascii_case(known);
+    is(".DS_Store") || is("Thumbs.db") || is("desktop.ini") || (name.starts_with("._") && !is_temporary(name))
+}
+
+/// A temporary file that gets its name when it is committed. Dropping it before removes it.
 #[derive(Debug)]
 pub(crate) struct Pending {
     file: File,
@@ -49,19 +55,19 @@ pub(crate) struct Pending {
     path: PathBuf,
     name: String,
     committed: bool,
-    /// The store that the file is put into.
+    /// The store that receives the file.
     remote: Option<Arc<Remote>>,
 }
 
 impl Pending {
-    /// Opens a file that will have this path once it is committed, and this name in the folder.
+    /// Creates a temporary file. Its commit gives it this path and this name in the folder.
     pub(super) fn open(path: PathBuf, name: &str, remote: Option<Arc<Remote>>) -> Result<Self, Error> {
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let file_name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let mut attempts = 0;
         loop {
             attempts += 1;
-            // A number that no other process has: it keeps two writers of the same file apart and reaches no output.
+            // A random number separates two writers of the same file. It reaches no output.
             let unique = RandomState::new().hash_one(&path);
             let temporary = folder.join(format!(".{file_name}.{unique:016x}{TEMPORARY_ENDING}"));
             let open = || {
@@ -73,11 +79,11 @@ impl Pending {
                 _ => Err(e),
             });
             let file = file.map_err(Error::io("write", &path))?;
-            // The lock keeps `Folder::sweep` of another process away. If that was faster, the file is lost and another one is
-            // made. File systems without locks do without.
+            // The lock protects the file from `Folder::sweep` of another process. If that process was faster, another
+            // file is created. File systems without locks skip this protection.
             let is_locked_by_other = matches!(file.try_lock(), Err(TryLockError::WouldBlock));
             let is_gone = || temporary.symlink_metadata().is_err_and(|e| e.kind() == io::ErrorKind::NotFound);
-            if attempts == MOST_ATTEMPTS || (!is_locked_by_other && !is_gone()) {
+            if attempts == MAX_ATTEMPTS || (!is_locked_by_other && !is_gone()) {
                 let name = name.to_owned();
                 return Ok(Self { file, temporary, path, name, committed: false, remote });
             }
@@ -88,19 +94,19 @@ impl Pending {
         &self.path
     }
 
-    /// Writes to the file. Nothing is held back: what is written through a handle is written when the call returns.
+    /// Returns an unbuffered writer to the file.
     pub(crate) fn handle(&self) -> Result<Handle, Error> {
         self.file.try_clone().map(Handle).map_err(Error::io("write", &self.path))
     }
 
-    /// Brings the file to the disk and gives it its name.
+    /// Syncs the file to the disk and renames it to its name.
     pub(crate) fn commit(mut self) -> Result<FileRecord, Error> {
         let record = self.seal()?;
         self.rename()?;
         Ok(record)
     }
 
-    /// The same of a file with this content.
+    /// Writes `bytes` and commits the file.
     pub(super) fn write_whole(mut self, bytes: &[u8]) -> Result<FileRecord, Error> {
         let written = self.handle()?.write_all(bytes).and_then(|()| fault::sync(&self.file));
         written.map_err(Error::io("write", &self.path))?;
@@ -108,25 +114,25 @@ impl Pending {
         Ok(FileRecord::of(&self.name, bytes))
     }
 
-    /// As [`commit`](Self::commit), if there is no such file. Says whether there was none.
-    pub(super) fn commit_unless_there(mut self) -> Result<bool, Error> {
+    /// As [`commit`](Self::commit), but only if no file has the name. Returns whether the file was committed.
+    pub(super) fn commit_new(mut self) -> Result<bool, Error> {
         self.seal()?;
         if self.remote.is_none() {
             match fault::point().and_then(|()| fs::hard_link(&self.temporary, &self.path)) {
-                // The temporary name goes with this.
+                // Dropping `self` removes the temporary name.
                 Ok(()) => return Ok(true),
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => return Ok(false),
-                // Not every file system has a second name for a file.
+                // Not every file system has hard links.
                 Err(_) => {}
             }
         }
         self.rename().map(|()| true)
     }
 
-    /// Brings the file to the disk, and says what is in it.
+    /// Syncs the file to the disk and returns its size and hash.
     pub(super) fn seal(&mut self) -> Result<FileRecord, Error> {
         let sealed = fault::sync(&self.file)
-            // Read back: what counts is what is there, however it was written.
+            // The hash is that of the file on the disk.
             .and_then(|()| self.file.seek(SeekFrom::Start(0)))
             .and_then(|_| measure(&mut self.file));
         let (bytes, sha256) = sealed.map_err(Error::io("write", &self.path))?;
@@ -136,7 +142,7 @@ impl Pending {
     pub(super) fn rename(&mut self) -> Result<(), Error> {
         let rename = || fault::point().and_then(|()| fs::rename(&self.temporary, &self.path));
         let renamed = rename().or_else(|error| match error.kind() {
-            // A folder in the file's place gives way if there is nothing in it.
+            // Replaces an empty folder of the same name.
             io::ErrorKind::IsADirectory if fs::remove_dir(&self.path).is_ok() => rename(),
             _ => Err(error),
         });
@@ -149,7 +155,7 @@ impl Pending {
 impl Drop for Pending {
     fn drop(&mut self) {
         if !self.committed {
-            // Nothing more can be done about a file that cannot be removed.
+            // An error here has no caller to report to.
             let _ = fs::remove_file(&self.temporary);
         }
     }

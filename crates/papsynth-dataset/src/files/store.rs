@@ -1,4 +1,4 @@
-//! Where a data set lies: a folder, or an object store.
+//! Locations of data sets: folders and object stores.
 
 use std::collections::BTreeMap;
 use std::fmt::{self, Debug, Formatter};
@@ -10,55 +10,55 @@ use std::sync::Arc;
 
 use crate::error::Error;
 
-/// Keeps whole files under names, such as a bucket of an object store. There is nothing to rename: a file appears whole by being put, or not at all.
+/// An object store, for example a bucket. [`put`](Self::put) is atomic: a file appears complete or not at all.
 ///
-/// Names are relative, with `/` between their parts, as those of the files of a data set.
+/// Names are relative paths with `/` between their parts.
 pub trait Store: Send + Sync {
-    /// Where it is, for messages: `s3://bucket/prefix`.
+    /// Returns the address for messages: `s3://bucket/prefix`.
     fn url(&self) -> String;
 
-    /// Size of a file; none if there is no such file.
+    /// Returns the size of a file in bytes, or `None` if it does not exist.
     ///
     /// # Errors
-    /// If the store does not answer.
+    /// If the store does not respond.
     fn size(&self, name: &str) -> io::Result<Option<u64>>;
 
-    /// Copies a file to a path and says whether there is one.
+    /// Copies a file to a path. Returns whether the file exists.
     ///
     /// # Errors
-    /// If the store does not answer, or the file cannot be written.
+    /// If the store does not respond, or the file cannot be written.
     fn get(&self, name: &str, to: &Path) -> io::Result<bool>;
 
-    /// Puts a file there, whole, in place of a former one.
+    /// Uploads a file and replaces an existing one.
     ///
     /// # Errors
-    /// If the store does not take it; then there is no such file, or still the former one.
+    /// If the store rejects it. An existing file is then unchanged.
     fn put(&self, name: &str, from: &Path) -> io::Result<()>;
 
-    /// Removes a file, if there is one.
+    /// Removes a file if it exists.
     ///
     /// # Errors
-    /// If the store does not answer.
+    /// If the store does not respond.
     fn remove(&self, name: &str) -> io::Result<()>;
 
-    /// Names and sizes of all files whose names begin with a folder's and `/`; of all, if that is empty.
+    /// Returns names and sizes of all files in a folder and its subfolders; of all files if `folder` is empty.
     ///
     /// # Errors
-    /// If the store does not answer.
+    /// If the store does not respond.
     fn list(&self, folder: &str) -> io::Result<BTreeMap<String, u64>>;
 }
 
-/// Where a data set lies: a folder, or an object store.
+/// The location of a data set: a folder or an object store.
 ///
-/// Whatever takes a home takes a path too.
+/// Paths convert into locations.
 #[derive(Clone, Debug)]
-pub struct Home {
+pub struct Location {
     pub(crate) root: PathBuf,
     pub(crate) remote: Option<Arc<Remote>>,
 }
 
-impl Home {
-    /// Whether a path is meant as the address of an object store, known or not: it begins with a scheme such as `s3://`.
+impl Location {
+    /// Whether a path is an address: it begins with a scheme such as `s3://`, supported or not.
     #[must_use]
     pub fn is_address(path: &Path) -> bool {
         let scheme = path.to_str().and_then(|text| text.split_once("://")).map(|(scheme, _)| scheme);
@@ -66,11 +66,12 @@ impl Home {
             .is_some_and(|scheme| !scheme.is_empty() && scheme.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'+'))
     }
 
-    /// A data set in an object store. Files are written and read in a folder of their own below the system's folder for temporary files
-    /// (`TMPDIR`), which holds as much as the shards that are made at once and vanishes with the last use of this home.
+    /// A data set in an object store. Files are written and read in a new subfolder of the system's folder for
+    /// temporary files (`TMPDIR`). It holds at most the shards in work and is removed when the last copy of this value
+    /// is dropped.
     ///
     /// # Errors
-    /// If that folder cannot be made.
+    /// If that folder cannot be created.
     pub fn in_store(store: impl Store + 'static) -> Result<Self, Error> {
         let unique = RandomState::new().hash_one(std::process::id());
         let root = std::env::temp_dir().join(format!("papsynth-{unique:016x}"));
@@ -80,19 +81,19 @@ impl Home {
     }
 }
 
-impl<P: AsRef<Path> + ?Sized> From<&P> for Home {
+impl<P: AsRef<Path> + ?Sized> From<&P> for Location {
     fn from(folder: &P) -> Self {
         Self { root: folder.as_ref().to_owned(), remote: None }
     }
 }
 
-impl From<&Home> for Home {
-    fn from(home: &Home) -> Self {
+impl From<&Location> for Location {
+    fn from(home: &Location) -> Self {
         home.clone()
     }
 }
 
-/// An object store, and the folder where its files are worked on.
+/// An object store with the local folder for copies of its files.
 pub(crate) struct Remote {
     store: Box<dyn Store>,
     url: String,
@@ -104,7 +105,7 @@ impl Remote {
         PathBuf::from(format!("{}/{name}", self.url))
     }
 
-    /// A path in the folder for temporary files as one in the store; another stays as it is.
+    /// Returns the address of a local copy. Other paths are returned unchanged.
     pub(crate) fn named(&self, path: &Path) -> PathBuf {
         match path.strip_prefix(&self.scratch) {
             Ok(below) if below.as_os_str().is_empty() => PathBuf::from(&self.url),
@@ -117,7 +118,7 @@ impl Remote {
         self.store.size(name).map_err(Error::io("read", &self.shown(name)))
     }
 
-    /// Copies a file to a path below the folder for temporary files.
+    /// Copies a file to a path in the folder for temporary files.
     pub(crate) fn get(&self, name: &str, to: &Path) -> Result<bool, Error> {
         let folder = to.parent().unwrap_or(&self.scratch);
         fs::create_dir_all(folder).map_err(Error::io("write", folder))?;
@@ -145,7 +146,7 @@ impl Debug for Remote {
 
 impl Drop for Remote {
     fn drop(&mut self) {
-        // What stays behind is in the folder for temporary files.
+        // Files that cannot be removed stay in the folder for temporary files.
         let _ = fs::remove_dir_all(&self.scratch);
     }
 }
@@ -155,12 +156,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn addresses_are_told_from_folders() {
+    fn addresses_and_folders_are_distinguished() {
         for address in ["s3://bucket/a", "gs://b/c", "ftp://x"] {
-            assert!(Home::is_address(Path::new(address)), "{address}");
+            assert!(Location::is_address(Path::new(address)), "{address}");
         }
         for folder in ["out", "/a/b", "C:\\out", "a b://c", "://x", "s3:/a"] {
-            assert!(!Home::is_address(Path::new(folder)), "{folder}");
+            assert!(!Location::is_address(Path::new(folder)), "{folder}");
         }
     }
 }

@@ -3,6 +3,7 @@
 use papsynth::Plane;
 use papsynth::truth::Group;
 
+use super::depth::{Depth, TRAINING_BITS};
 use super::names;
 use super::ome::{Levels, description, label_tiff, page};
 use super::sink::{Field, Files, Sink};
@@ -23,18 +24,21 @@ pub(super) fn check(written: &Written) -> Result<(), Error> {
     let (frame, truth) = (written.field.frame, written.field.truth);
     let index = frame.index;
     written.file(&names::image(frame), |bytes| {
-        written.planes(bytes)?;
+        written.planes(bytes, Depth::Camera)?;
         if frame.is_stack() { is_described(bytes, &description(frame)) } else { Ok(()) }
     })?;
     if frame.is_stack() {
-        written.file(&names::all_in_focus(index), |bytes| written.picture(bytes))?;
+        written.file(&names::all_in_focus(index), |bytes| written.image(bytes, Depth::Camera))?;
+    }
+    if frame.bits > TRAINING_BITS {
+        written.file(&names::preview(index), |bytes| written.image(bytes, Depth::Training))?;
     }
     written.file(&names::noise_free(index), |bytes| {
         let due = frame.planes_um.len();
         let pages = read::float_pages(bytes, &LIMITS, due)?;
-        Problem::unless(pages.len() == due, format!("it has {} planes, the record says {due}", pages.len()))?;
+        Problem::unless(pages.len() == due, format!("{} planes; the record has {due}", pages.len()))?;
         let fits = pages.iter().all(|page| page.len() == frame.values() && page.iter().all(|v| v.is_finite()));
-        Problem::unless(fits, "it has not the finite values of the size that the record says")
+        Problem::unless(fits, "the size differs from the record, or some values are not finite")
     })?;
     for group in Group::ALL {
         let ids = truth.labels(group).ids;
@@ -66,14 +70,17 @@ impl Sink for Frames {
 
     fn field(&mut self, field: &Field, files: &mut Files) -> Result<(), Error> {
         let (frame, index) = (field.frame, field.frame.index);
-        let picture = match self.stack.take() {
+        let image = match self.stack.take() {
             Some(pages) => {
                 files.written.push(pages.commit()?);
                 names::all_in_focus(index)
             }
             None => names::image(frame),
         };
-        files.png(&picture, field)?;
+        files.png(&image, field, Depth::Camera)?;
+        if frame.bits > TRAINING_BITS {
+            files.png(&names::preview(index), field, Depth::Training)?;
+        }
         let mut ids = Vec::new();
         for group in Group::ALL {
             field.truth.labels_into(group, &mut ids);

@@ -1,4 +1,4 @@
-//! The formats that a data set is written in, and how it lies in files.
+//! The formats of a data set, and its layout in files.
 
 use std::fmt::{self, Formatter};
 use std::ops::Range;
@@ -6,38 +6,39 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::depth::Depth;
 use crate::error::{Error, Problem};
 use crate::truth::Flatten;
 
 /// Whether this build writes Parquet.
 pub(crate) const HAS_PARQUET: bool = cfg!(feature = "parquet");
 
-/// A way to write images and their truth.
+/// A file format for images with ground truth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Format {
-    /// PNG and TIFF files in folders, label images, noise-free images.
+    /// PNG and TIFF files in folders: images, label images, noise-free images.
     Folder,
-    /// Tar files of many frames for streaming readers.
+    /// Tar files of many frames for streaming readers. Images have 8 bits.
     Webdataset,
-    /// OME-TIFF images with their labels as further files.
+    /// OME-TIFF images, with labels in separate files.
     OmeTiff,
-    /// Images beside `_masks` of one label a pixel.
+    /// Images of 8 bits, and `_masks` with one label per pixel.
     Cellpose,
-    /// `images` and `masks` of one label a pixel.
+    /// `images` of 8 bits, and `masks` with one label per pixel.
     Stardist,
-    /// Polygons for detectors that segment.
+    /// Images of 8 bits, and polygons.
     YoloSeg,
-    /// GeoJSON, nuclei within cells, beside OME-TIFF images.
+    /// OME-TIFF images, and GeoJSON with nuclei within cells.
     Qupath,
-    /// OME-Zarr groups with their labels; of builds with the feature `zarr`.
+    /// OME-Zarr groups with labels. Needs the feature `zarr`.
     OmeZarr,
-    /// Parquet files of many frames, as the library `datasets` reads them; of builds with the feature `parquet`.
+    /// Parquet files of many frames for the library `datasets`. Images have 8 bits. Needs the feature `parquet`.
     Huggingface,
 }
 
 impl Format {
-    /// All formats, also those that this build cannot write ([`needs`](Self::needs)).
+    /// All formats, including those that this build cannot write ([`needs`](Self::needs)).
     pub const ALL: [Self; 9] = [
         Self::Folder,
         Self::Webdataset,
@@ -50,12 +51,12 @@ impl Format {
         Self::Huggingface,
     ];
 
-    /// The formats that this build writes and reads.
+    /// Returns the formats that this build writes and reads.
     pub fn built() -> impl Iterator<Item = Self> {
         Self::ALL.into_iter().filter(|format| format.needs().is_none())
     }
 
-    /// The feature that a build must have to write and read it, if this one has it not.
+    /// Returns the feature that the format needs, if this build does not have it.
     #[must_use]
     pub fn needs(self) -> Option<&'static str> {
         match self {
@@ -65,74 +66,85 @@ impl Format {
         }
     }
 
-    /// How it is called where it is missing.
+    /// Returns the name of the format for error messages.
     pub(crate) fn title(self) -> String {
         format!("the format `{}`", self.name())
     }
 
-    /// What to say of a data set where a format is missing.
+    /// Returns the error for a data set with a format that this build does not have.
     #[cfg_attr(all(feature = "zarr", feature = "parquet"), expect(dead_code, reason = "no format is missing"))]
     pub(crate) fn missing(self, path: &Path) -> Error {
         Error::missing_feature(&self.title(), self.needs().unwrap_or_default(), path)
     }
 
-    /// Its name, which is also that of its folder in a data set (but for [`Folder`](Self::Folder), whose folders lie at the top).
+    /// Returns the name of the format. It is also the name of its folder in a data set, except that the folders of
+    /// [`Folder`](Self::Folder) are at the top.
     #[must_use]
     pub fn name(self) -> &'static str {
-        self.words().0
+        self.description().0
     }
 
-    /// What it is, in a line.
+    /// Returns a one-line description.
     #[must_use]
     pub fn about(self) -> &'static str {
-        self.words().1
+        self.description().1
     }
 
-    fn words(self) -> (&'static str, &'static str) {
+    fn description(self) -> (&'static str, &'static str) {
         match self {
-            Self::Folder => ("folder", "PNG images (stacks: OME-TIFF), noise-free images, label TIFFs in folders"),
-            Self::Webdataset => ("webdataset", "tar shards for streaming: image and truth of each frame"),
-            Self::OmeTiff => ("ome-tiff", "OME-TIFF, pyramidal where large, with label layers that never overlap"),
-            Self::Cellpose => ("cellpose", "images beside _masks, for cytoplasm and for nuclei"),
-            Self::Stardist => ("stardist", "images/ and masks/, for cytoplasm and for nuclei"),
-            Self::YoloSeg => ("yolo-seg", "images/ and labels/ by split, with polygons, and data.yaml"),
-            Self::Qupath => ("qupath", "GeoJSON with nuclei within cells, beside OME-TIFF images"),
-            Self::OmeZarr => ("ome-zarr", "OME-Zarr 0.5, pyramidal where large, with label layers that never overlap"),
-            Self::Huggingface => ("huggingface", "Parquet shards by split for `datasets`: images, objects with masks"),
+            Self::Folder => ("folder", "PNG images (stacks: OME-TIFF), noise-free images and label TIFFs in folders"),
+            Self::Webdataset => ("webdataset", "tar shards for streaming: 8-bit image and ground truth of each frame"),
+            Self::OmeTiff => ("ome-tiff", "OME-TIFF (large images: pyramids), with label layers without overlap"),
+            Self::Cellpose => ("cellpose", "8-bit images and _masks, for cytoplasm and for nuclei"),
+            Self::Stardist => ("stardist", "8-bit images/ and masks/, for cytoplasm and for nuclei"),
+            Self::YoloSeg => ("yolo-seg", "8-bit images/ and labels/ (polygons) by split, and data.yaml"),
+            Self::Qupath => ("qupath", "OME-TIFF images, and GeoJSON with nuclei within cells"),
+            Self::OmeZarr => ("ome-zarr", "OME-Zarr 0.5 (large images: pyramids), with label layers without overlap"),
+            Self::Huggingface => {
+                ("huggingface", "Parquet shards by split for `datasets`: 8-bit images, objects with masks")
+            }
         }
     }
 
-    /// Whether it keeps many frames in a file.
+    /// Bit depth of the images.
+    pub(crate) fn depth(self) -> Depth {
+        match self {
+            Self::Folder | Self::OmeTiff | Self::Qupath | Self::OmeZarr => Depth::Camera,
+            Self::Webdataset | Self::Cellpose | Self::Stardist | Self::YoloSeg | Self::Huggingface => Depth::Training,
+        }
+    }
+
+    /// Whether a file has many frames.
     pub(crate) fn is_sharded(self) -> bool {
         matches!(self, Self::Webdataset | Self::Huggingface)
     }
 
-    /// Whether it has room for one object of a group a pixel.
+    /// Whether label images have one label per pixel.
     pub(crate) fn is_flat(self) -> bool {
         matches!(self, Self::Cellpose | Self::Stardist)
     }
 
-    /// Whether it has all planes of a stack, rather than its picture with everything in focus alone.
+    /// Whether a stack is written with all planes, not only as the all-in-focus image.
     pub(crate) fn has_planes(self) -> bool {
         matches!(self, Self::Folder | Self::Webdataset | Self::OmeTiff | Self::OmeZarr | Self::Huggingface)
     }
 }
 
-/// Most frames of a shard.
+/// Largest number of frames of a shard.
 const MOST_FRAMES_PER_SHARD: u64 = 1_000_000_000;
 
-/// How a data set lies in files: decided when it is begun, and kept in its manifest.
+/// The layout of a data set in files. It is fixed when the data set is created, and is recorded in the manifest.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Layout {
-    /// The formats it is written in, in the order of [`Format::ALL`], each once; at least one.
+    /// The formats, in the order of [`Format::ALL`], without duplicates; at least one.
     pub formats: Vec<Format>,
-    /// Frames that are written, made again and recorded together, at least 1: shard *n* holds those with an index from
-    /// *n* times this number on.
+    /// Number of frames of a shard, at least 1. Frames of a shard are written and recorded together. The first frame of shard *n*
+    /// has the index *n* times this number.
     pub frames_per_shard: u64,
-    /// What pixels show that belong to several objects, in formats that have one label a pixel.
+    /// Which label a pixel gets where objects overlap, in formats with one label per pixel.
     pub flatten: Flatten,
-    /// Whether the table of objects is also written as Parquet, with masks; wants the feature `parquet`.
+    /// Whether the table of objects is also written as Parquet, with masks. Needs the feature `parquet`.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub objects_parquet: bool,
     /// Whether the scene of every frame is written, as JSON.
@@ -147,10 +159,10 @@ impl Default for Layout {
 }
 
 impl Layout {
-    /// Frames of a shard of formats that keep many in a file: some hundred megabytes.
+    /// Default number of frames of a shard for formats with many frames in a file: some hundred megabytes.
     pub const FRAMES_PER_SHARD: u64 = 256;
 
-    /// The usual layout of these formats: with the feature `parquet` objects are also written as Parquet.
+    /// Returns the default layout of these formats. With the feature `parquet`, objects are also written as Parquet.
     #[must_use]
     pub fn new(formats: impl IntoIterator<Item = Format>) -> Self {
         let mut formats: Vec<Format> = formats.into_iter().collect();
@@ -161,24 +173,24 @@ impl Layout {
         Self { formats, frames_per_shard, flatten: Flatten::Top, objects_parquet: HAS_PARQUET, scenes: false }
     }
 
-    /// Why a range of frames cannot be made, if it cannot: it begins within a shard.
+    /// Returns an error message if a range of frames does not begin at the start of a shard.
     #[must_use]
     pub fn refusal_of(&self, frames: &Range<u64>) -> Option<String> {
         let each = self.frames_per_shard;
         (!frames.is_empty() && !frames.start.is_multiple_of(each)).then(|| {
             format!(
-                "frames {}..{} begin within a shard; with {each} frames a shard a range begins at a multiple of {each}",
+                "frames {}..{} begin within a shard of {each} frames; expected a start that is a multiple of {each}",
                 frames.start, frames.end
             )
         })
     }
 
-    /// A layout that was read is one that can be written.
+    /// Checks a layout that was read from a file.
     pub(crate) fn check(&self) -> Result<(), Problem> {
         let message = match self.frames_per_shard {
-            1..=MOST_FRAMES_PER_SHARD if self.formats.is_empty() => "the layout names no format".to_owned(),
+            1..=MOST_FRAMES_PER_SHARD if self.formats.is_empty() => "the layout has no format".to_owned(),
             1..=MOST_FRAMES_PER_SHARD if !self.formats.is_sorted_by(|a, b| a < b) => {
-                "the formats of the layout are not in order, each once".to_owned()
+                "the formats of the layout are not sorted, or have duplicates".to_owned()
             }
             1..=MOST_FRAMES_PER_SHARD => return Ok(()),
             frames => format!("frames_per_shard is {frames}; expected 1 to {MOST_FRAMES_PER_SHARD}"),
@@ -186,12 +198,12 @@ impl Layout {
         Err(Problem::broken("JSON", message))
     }
 
-    /// Whether every frame is a shard of its own.
+    /// Whether each shard has one frame.
     pub(crate) fn is_by_frame(&self) -> bool {
         self.frames_per_shard == 1
     }
 
-    /// The feature without which this build cannot write it, and what wants it.
+    /// Returns the feature that the layout needs and this build does not have, and the part of the layout that needs it.
     pub(crate) fn needs(&self) -> Option<(&'static str, String)> {
         let format = self.formats.iter().find_map(|format| Some((format.needs()?, format.title())));
         let table =
@@ -199,7 +211,7 @@ impl Layout {
         format.or(table)
     }
 
-    /// Whether a format is among the data set's.
+    /// Whether the data set has a format.
     #[must_use]
     pub fn has(&self, format: Format) -> bool {
         self.formats.contains(&format)
@@ -210,7 +222,15 @@ impl fmt::Display for Layout {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let names: Vec<&str> = self.formats.iter().map(|format| format.name()).collect();
         let table = if self.objects_parquet { ", objects also as Parquet" } else { "" };
+        let frames = if self.frames_per_shard == 1 { "frame" } else { "frames" };
         let scenes = if self.scenes { ", with scenes" } else { "" };
-        write!(f, "{} with {} a shard, {}{table}{scenes}", names.join(","), self.frames_per_shard, self.flatten.name())
+        write!(
+            f,
+            "{} with {} {} per shard, {}{table}{scenes}",
+            names.join(","),
+            self.frames_per_shard,
+            frames,
+            self.flatten.name()
+        )
     }
 }

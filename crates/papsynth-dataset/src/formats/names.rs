@@ -1,4 +1,4 @@
-//! Which file of a data set lies where.
+//! Names of the files of a data set.
 
 use papsynth::truth::Group;
 
@@ -15,16 +15,16 @@ pub(crate) const CARD: &str = "README.md";
 pub(crate) const CROISSANT: &str = "croissant.json";
 pub(crate) const SPLITS: &str = "splits.csv";
 
-/// The files that lie in a data set itself, but for the map that its recipe names.
+/// The files at the top of a data set, except the map that the recipe names.
 pub(crate) const OF_EVERY_SET: [&str; 9] = [RECIPE, MODEL, TABLE, OBJECTS, COCO, SPLITS, SHEET, CARD, CROISSANT];
 
-/// Records and truth of all shards.
+/// Folder with the records and COCO documents of the shards.
 pub(crate) const SHARDS: &str = "shards";
 
-/// Tables of all shards.
+/// Folder with the tables of the shards.
 pub(crate) const TABLES: &str = "objects";
 
-/// The name of a frame or shard: its number in at least six digits.
+/// Returns the name of a frame or shard: its number with at least six digits.
 pub(crate) fn numbered(number: u64) -> String {
     format!("{number:06}")
 }
@@ -39,6 +39,11 @@ pub(crate) fn noise_free(index: u64) -> String {
 
 pub(crate) fn all_in_focus(index: u64) -> String {
     format!("all-in-focus/{index:06}.png")
+}
+
+/// Image of a camera of more than 8 bits, at 8 bits.
+pub(crate) fn preview(index: u64) -> String {
+    format!("preview/{index:06}.png")
 }
 
 pub(crate) fn labels(group: Group, index: u64) -> String {
@@ -69,30 +74,30 @@ pub(crate) fn scene(index: u64) -> String {
     format!("scenes/{index:06}.json")
 }
 
-/// The number of the shard whose record has this file name.
+/// Returns the number of the shard whose record has this file name.
 pub(crate) fn number_of_record(file_name: &str) -> Option<u64> {
     let digits = file_name.strip_suffix(".json")?;
     let number = digits.parse().ok()?;
     (numbered(number) == digits).then_some(number)
 }
 
-/// The folder of a frame that is a group of Zarr.
+/// Returns the folder of the Zarr group of a frame.
 pub(crate) fn zarr_group(index: u64) -> String {
     format!("ome-zarr/{index:06}{ZARR_GROUP}")
 }
 
-/// How the name of such a folder ends.
+/// Extension of the folder of a Zarr group.
 pub(crate) const ZARR_GROUP: &str = ".ome.zarr";
 
-/// The card of the format `huggingface` that names the files of each split.
+/// Dataset card of the format `huggingface`, with the files of each split.
 pub(crate) const HUGGINGFACE_CARD: &str = "huggingface/README.md";
 
-/// The file of the frames of a shard that fall into a split. Its name tells no total: shards are written in any order.
+/// Returns the file with the frames of a shard in a split. The name has no total number, because shards are written in any order.
 pub(crate) fn huggingface_file(split: Split, shard: u64) -> String {
     format!("huggingface/data/{}-{shard:06}.parquet", huggingface_split(split))
 }
 
-/// The name of a split as Hugging Face has it.
+/// Returns the name of a split on Hugging Face.
 pub(crate) fn huggingface_split(split: Split) -> &'static str {
     match split {
         Split::Train => "train",
@@ -101,11 +106,11 @@ pub(crate) fn huggingface_split(split: Split) -> &'static str {
     }
 }
 
-/// The picture of a frame or all planes of a stack, by how their names end, behind the name of their file.
+/// Returns the path of the image of a frame, or of all planes of a stack: the file, then a name with this extension.
 pub(super) fn huggingface_image(seed: u64, shard: u64, frame: &FrameSummary, ending: &str) -> String {
     format!("{}/{}{ending}", huggingface_file(Split::of_slide(seed, frame.slide), shard), numbered(frame.index))
 }
 
-/// How names within a file end: of a picture, and of all planes of a stack.
-pub(crate) const PICTURE: &str = ".png";
+/// Extensions of names within a file: of an image, and of all planes of a stack.
+pub(crate) const IMAGE: &str = ".png";
 pub(crate) const PLANES: &str = ".planes";

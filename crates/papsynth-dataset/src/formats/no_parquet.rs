@@ -1,4 +1,4 @@
-//! What stands for `parquet` in a build without the feature of that name: whatever wants it says so.
+//! Replaces `parquet` in a build without this feature. Every function returns an error.
 
 use std::convert::Infallible;
 use std::io::Write;
@@ -23,7 +23,7 @@ pub(crate) fn card(_: &[String], _: &[Split]) -> Result<(String, Vec<u8>), Error
     Err(Format::Huggingface.missing(Path::new(names::HUGGINGFACE_CARD)))
 }
 
-/// A table that is not written.
+/// A table that cannot exist.
 pub(crate) struct Table<'a>(Infallible, PhantomData<&'a ()>);
 
 impl Table<'_> {

@@ -1,11 +1,12 @@
-//! Frames and labels as TIFF, and OME-XML that says what its pages are; `ome-tiff`: every frame an OME-TIFF, with its labels as layers that never
-//! overlap in a second one.
+//! Images and labels as TIFF with OME-XML; and `ome-tiff`: an OME-TIFF for the image of each frame, and one for each group of labels
+//! in layers without overlap.
 
 use std::io::{self, Cursor};
 
 use papsynth::Plane;
 use papsynth::truth::Group;
 
+use super::depth::Depth;
 use super::names::numbered;
 use super::sink::{Field, Files, Sink};
 use super::written::{Written, is_described};
@@ -13,10 +14,10 @@ use crate::error::Error;
 use crate::truth::{FrameSummary, layers};
 use crate::write::{Page, PageWriter, Pages, Pixels, compressed, fits_16_bits, is_large, label_pages};
 
-/// The µ of µm, as XML that is ASCII: readers of TIFF expect no other.
+/// `µm` as ASCII XML, because TIFF descriptions are ASCII.
 const MICROMETRE: &str = "&#181;m";
 
-/// The description of a frame, one page a plane, in the order of `planes_um`.
+/// Returns the OME-XML of a frame with one page per plane, in the order of `planes_um`.
 pub(super) fn description(frame: &FrameSummary) -> String {
     let planes = &frame.planes_um;
     let step = match planes.as_slice() {
@@ -35,14 +36,15 @@ pub(super) fn description(frame: &FrameSummary) -> String {
     image(frame, &numbered(frame.index), planes.len(), &step, &positions)
 }
 
-pub(super) fn of_picture(frame: &FrameSummary) -> String {
+/// Returns the OME-XML of an image of one plane.
+pub(super) fn image_description(frame: &FrameSummary) -> String {
     image(frame, &numbered(frame.index), 1, "", "")
 }
 
 fn image(frame: &FrameSummary, name: &str, planes: usize, step: &str, positions: &str) -> String {
     let (bits, channels) = (frame.bits, frame.channels);
     let kind = if bits <= 8 { "uint8" } else { "uint16" };
-    // The samples of a pixel lie side by side.
+    // The samples of a pixel are interleaved.
     let (order, interleaved) = if channels == 1 { ("XYZCT", "") } else { ("XYCZT", " Interleaved=\"true\"") };
     document(
         frame,
@@ -58,8 +60,8 @@ fn image(frame: &FrameSummary, name: &str, planes: usize, step: &str, positions:
     )
 }
 
-/// The description of layers of labels: each is a channel.
-pub(super) fn of_labels(frame: &FrameSummary, group: Group, layers: &[Vec<u32>]) -> String {
+/// Returns the OME-XML of layers of labels, each a channel.
+pub(super) fn labels_description(frame: &FrameSummary, group: Group, layers: &[Vec<u32>]) -> String {
     let kind = if layers.iter().all(|layer| fits_16_bits(layer)) { "uint16" } else { "uint32" };
     let layers = layers.len();
     let channels: String = (0..layers)
@@ -95,7 +97,7 @@ pub(super) fn page<'a>(frame: &FrameSummary, text: Option<&'a str>) -> Page<'a> 
     Page { width: frame.width, channels: frame.channels, pixel_um: frame.pixel_um, text }
 }
 
-/// Levels of a camera in as many bits as files have for them.
+/// Camera levels in the smallest sample type that holds them.
 pub(super) enum Levels<'a> {
     U8(Vec<u8>),
     U16(&'a [u16]),
@@ -116,30 +118,31 @@ impl<'a> Levels<'a> {
     }
 }
 
-pub(super) fn picture_tiff(picture: &[u16], frame: &FrameSummary, text: Option<&str>) -> io::Result<Vec<u8>> {
-    compressed(&[Levels::new(picture, frame).pixels()], &page(frame, text))
+pub(super) fn image_tiff(levels: &[u16], frame: &FrameSummary, text: Option<&str>) -> io::Result<Vec<u8>> {
+    compressed(&[Levels::new(levels, frame).pixels()], &page(frame, text))
 }
 
-/// The same as OME-TIFF, a pyramid if it is large.
-pub(super) fn ome_picture(picture: &[u16], frame: &FrameSummary) -> io::Result<Vec<u8>> {
-    let text = of_picture(frame);
+/// Encodes an image of one plane as OME-TIFF, with a pyramid if it is large.
+pub(super) fn ome_image(levels: &[u16], frame: &FrameSummary) -> io::Result<Vec<u8>> {
+    let text = image_description(frame);
     if !is_large(frame.width, frame.height) {
-        return picture_tiff(picture, frame, Some(&text));
+        return image_tiff(levels, frame, Some(&text));
     }
     let mut out = Cursor::new(Vec::new());
-    let levels = Levels::new(picture, frame);
-    PageWriter::new(&mut out, 3 * picture.len() as u64)?.write_pyramid(levels.pixels(), &page(frame, Some(&text)))?;
+    let bytes = 3 * levels.len() as u64;
+    let levels = Levels::new(levels, frame);
+    PageWriter::new(&mut out, bytes)?.write_pyramid(levels.pixels(), &page(frame, Some(&text)))?;
     Ok(out.into_inner())
 }
 
-/// A label image of 16 bits, or of 32 if a label needs them.
+/// Encodes a label image with 16 bits, or 32 if a label needs them.
 pub(super) fn label_tiff(ids: &[u32], frame: &FrameSummary) -> io::Result<Vec<u8>> {
     label_pages(&[ids], &Page { channels: 1, ..page(frame, None) })
 }
 
-/// Layers of labels as channels of an OME-TIFF.
+/// Encodes layers of labels as the channels of an OME-TIFF.
 pub(super) fn ome_labels(layers: &[Vec<u32>], group: Group, frame: &FrameSummary) -> io::Result<Vec<u8>> {
-    let text = of_labels(frame, group, layers);
+    let text = labels_description(frame, group, layers);
     label_pages(layers, &Page { channels: 1, ..page(frame, Some(&text)) })
 }
 
@@ -159,14 +162,14 @@ fn labels_name(group: Group, index: u64) -> String {
 pub(super) fn check(written: &Written) -> Result<(), Error> {
     let frame = written.field.frame;
     written.file(&name(frame.index), |bytes| {
-        written.planes(bytes)?;
+        written.planes(bytes, Depth::Camera)?;
         is_described(bytes, &description(frame))
     })?;
     Group::ALL.into_iter().try_for_each(|group| {
         let pages = layers(written.field.truth, group);
         written.file(&labels_name(group, frame.index), |bytes| {
             written.layers(bytes, &pages)?;
-            is_described(bytes, &of_labels(frame, group, &pages))
+            is_described(bytes, &labels_description(frame, group, &pages))
         })
     })
 }

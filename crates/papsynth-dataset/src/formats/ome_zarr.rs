@@ -1,6 +1,6 @@
-//! `ome-zarr`: every frame an OME-Zarr 0.5 group, its labels as layers that never overlap, each a label image.
+//! `ome-zarr`: an OME-Zarr 0.5 group for each frame, with labels in layers without overlap, each a label image.
 //!
-//! Every array lies in one shard, so that a frame is few files; a stack is compressed plane by plane, as it comes.
+//! Each array is one shard, so that a frame has few files. Planes of a stack are compressed when they are ready.
 
 use std::collections::BTreeSet;
 use std::io::Cursor;
@@ -13,6 +13,7 @@ use papsynth_zarr::{
 };
 use serde_json::{Map, Value, json};
 
+use super::depth::Depth;
 use super::names::{numbered, zarr_group as group_of};
 use super::sink::{Field, Files, Sink};
 use super::written::{LIMITS, Take, Written, is_of_masks};
@@ -23,7 +24,7 @@ use crate::truth::{FrameSummary, category_name, layers};
 use crate::write::{fits_16_bits, is_large};
 use papsynth::white_level as white;
 
-/// Side of a chunk: what a viewer reads at least.
+/// Width and height of a chunk, the smallest unit that a viewer reads.
 const CHUNK: usize = 512;
 
 #[derive(Default)]
@@ -51,7 +52,7 @@ impl Images {
     }
 }
 
-/// The arrays of an image or label image of a frame.
+/// Returns the arrays of an image or label image of a frame.
 fn pyramid(frame: &FrameSummary, kind: Kind, [channels, planes]: [Option<usize>; 2]) -> Result<Pyramid, Error> {
     let [width, height] = [frame.width, frame.height];
     let form = Form {
@@ -66,7 +67,7 @@ fn pyramid(frame: &FrameSummary, kind: Kind, [channels, planes]: [Option<usize>;
     Pyramid::new(&form).map_err(|error| frame.wrong(error.to_string()))
 }
 
-fn of_image(frame: &FrameSummary) -> Result<Pyramid, Error> {
+fn image_pyramid(frame: &FrameSummary) -> Result<Pyramid, Error> {
     let many = |count: usize| (count > 1).then_some(count);
     let kind = if frame.bits <= 8 { Kind::U8 } else { Kind::U16 };
     pyramid(frame, kind, [many(frame.channels), many(frame.planes_um.len())])
@@ -77,7 +78,7 @@ struct Layer {
     ids: Vec<u32>,
 }
 
-fn of_labels(field: &Field) -> Result<Vec<Layer>, Error> {
+fn label_layers(field: &Field) -> Result<Vec<Layer>, Error> {
     let mut found = Vec::new();
     for group in Group::ALL {
         let pages = layers(field.truth, group);
@@ -96,7 +97,7 @@ fn of_labels(field: &Field) -> Result<Vec<Layer>, Error> {
     Ok(found)
 }
 
-/// What is known of the objects of a group that a layer shows.
+/// Returns the properties of the objects of a group in a layer.
 fn properties(field: &Field, group: Group, shown: &BTreeSet<u32>) -> Vec<(u32, Map<String, Value>)> {
     let objects = field.truth.objects.iter().zip(&field.document.annotations);
     let shown = objects.filter(|(object, _)| object.group() == group && shown.contains(&object.id));
@@ -107,10 +108,10 @@ fn properties(field: &Field, group: Group, shown: &BTreeSet<u32>) -> Vec<(u32, M
                 ("class", json!(object.class)),
                 ("bethesda", json!(object.bethesda)),
                 ("kind", json!(object.kind.name())),
-                // A nucleus has the label of its cell.
+                // Nucleus and cell have the same label.
                 ("parent", json!(annotation.parent_id.map(|_| object.id))),
                 ("depth_um", json!(object.depth_um)),
-                ("stain", json!(object.stain)),
+                ("mean_absorbance", json!(object.mean_absorbance)),
                 ("area_um2", json!(object.area_um2)),
                 ("area_px", json!(object.amodal.area())),
                 ("truncated", json!(object.truncated)),
@@ -120,7 +121,7 @@ fn properties(field: &Field, group: Group, shown: &BTreeSet<u32>) -> Vec<(u32, M
         .collect()
 }
 
-/// Every `zarr.json` of a frame.
+/// Returns all `zarr.json` of a frame, with their paths.
 fn documents(seed: u64, frame: &FrameSummary, labels: Vec<Labels>) -> Result<Vec<(String, Vec<u8>)>, Error> {
     let planes = &frame.planes_um;
     let step_um = match planes.as_slice() {
@@ -136,7 +137,7 @@ fn documents(seed: u64, frame: &FrameSummary, labels: Vec<Labels>) -> Result<Vec
     });
     let image = Image {
         name: numbered(frame.index),
-        pyramid: of_image(frame)?,
+        pyramid: image_pyramid(frame)?,
         space: Space { pixel_um: frame.pixel_um, step_um, first_um: planes.first().copied().unwrap_or(0.0) },
         channels: channels(frame.channels, frame.bits),
         plane: planes.len() / 2,
@@ -146,7 +147,7 @@ fn documents(seed: u64, frame: &FrameSummary, labels: Vec<Labels>) -> Result<Vec
     image.documents().map_err(|error| frame.wrong(error.to_string()))
 }
 
-/// What the channels of an image are.
+/// Returns the descriptions of the channels of an image.
 pub(crate) fn channels(count: usize, bits: u32) -> Vec<Channel> {
     let range = [0.0, f64::from(white(bits))];
     let channel = |(label, color): (&str, [u8; 3])| Channel { label: label.to_owned(), color, range, window: range };
@@ -156,7 +157,7 @@ pub(crate) fn channels(count: usize, bits: u32) -> Vec<Channel> {
     }
 }
 
-/// The one shard of a level, from the folder of its group.
+/// Returns the path of the shard of a level within the folder of the group.
 fn shard_file(level: usize, array: &papsynth_zarr::Array) -> String {
     format!("{level}/{}", array.file(Shard::default()))
 }
@@ -165,7 +166,7 @@ impl Sink for Images {
     fn begin(&mut self, frame: &FrameSummary, files: &Files) -> Result<(), Error> {
         let group = group_of(frame.index);
         self.levels.clear();
-        for (level, array) in of_image(frame)?.levels().iter().enumerate() {
+        for (level, array) in image_pyramid(frame)?.levels().iter().enumerate() {
             let name = format!("{group}/{}", shard_file(level, array));
             let output = Output::new(files.folder.pending(&name)?)?;
             let encoder = ShardEncoder::new(array, Shard::default()).map_err(|error| frame.wrong(error.to_string()))?;
@@ -178,7 +179,7 @@ impl Sink for Images {
         for channel in 0..frame.channels {
             let values = plane.grey.iter().skip(channel).step_by(frame.channels);
             let added = match frame.bits {
-                // Checked to fit before it came here.
+                // `ShardWriter` has checked that levels fit into the bits of the camera.
                 ..=8 => self.add(channel, plane.index, values.map(|&v| v.to_le_bytes()[0]).collect()),
                 _ => self.add(channel, plane.index, values.copied().collect()),
             };
@@ -196,7 +197,7 @@ impl Sink for Images {
             files.written.push(output.into_pending()?.commit()?);
         }
         let mut described = Vec::new();
-        for Layer { labels, ids } in of_labels(field)? {
+        for Layer { labels, ids } in label_layers(field)? {
             let folder = format!("{group}/{}", labels.folder());
             for (name, bytes) in label_shards(&labels, ids).map_err(broken)? {
                 files.write(&format!("{folder}/{name}"), &bytes)?;
@@ -217,7 +218,7 @@ fn failed(error: papsynth_zarr::Error, folder: &Folder, group: &str, frame: &Fra
     }
 }
 
-/// The shards of all levels of a label image, by their names in its folder.
+/// Returns the shards of all levels of a label image, with their paths in its folder.
 fn label_shards(labels: &Labels, mut ids: Vec<u32>) -> Result<Vec<(String, Vec<u8>)>, papsynth_zarr::Error> {
     let mut shards = Vec::new();
     for (level, array) in labels.pyramid.levels().iter().enumerate() {
@@ -231,24 +232,24 @@ fn label_shards(labels: &Labels, mut ids: Vec<u32>) -> Result<Vec<(String, Vec<u
     Ok(shards)
 }
 
-/// Values of which none needs more than 16 bits.
+/// Narrows values to 16 bits.
 fn small(values: &[u32]) -> Vec<u16> {
     values.iter().map(|&value| u16::try_from(value).unwrap_or(u16::MAX)).collect()
 }
 
-/// Whether a frame is what its truth says: documents to the letter, levels each the half of that before, labels those of the masks.
+/// Checks a frame: documents are equal, each level is the previous one at half size, labels are those of the masks.
 pub(super) fn check(written: &Written) -> Result<(), Error> {
     let field = written.field;
     let (frame, group) = (field.frame, group_of(field.frame.index));
-    let layers = of_labels(field)?;
+    let layers = label_layers(field)?;
     for (name, expected) in documents(field.seed, frame, layers.iter().map(|layer| layer.labels.clone()).collect())? {
         written.file(&format!("{group}/{name}"), |bytes| {
-            Problem::unless(bytes == expected, "it does not say what the record and coco.json do")
+            Problem::unless(bytes == expected, "the content differs from the record and coco.json")
         })?;
     }
-    let pyramid = of_image(frame)?;
+    let pyramid = image_pyramid(frame)?;
     let first = format!("{group}/{}", shard_file(0, &pyramid.levels()[0]));
-    written.file(&first, |bytes| written.shown(&mut |take| planes(bytes, frame, take)))?;
+    written.file(&first, |bytes| written.read_planes(Depth::Camera, &mut |take| planes(bytes, frame, take)))?;
     are_halves(written, &group, &pyramid)?;
     layers.into_iter().try_for_each(|Layer { labels, ids }| are_labels(written, &group, &labels, ids))
 }
@@ -265,7 +266,10 @@ fn are_halves(written: &Written, group: &str, pyramid: &Pyramid) -> Result<(), E
             let [channels, planes, _, width] = full.shape();
             for (plane, channel) in (0..planes).flat_map(|plane| (0..channels).map(move |channel| (plane, channel))) {
                 let expected = halved(&above.plane(channel, plane)?, width);
-                Problem::unless(below.plane(channel, plane)? == expected, "it is not the half of the level before")?;
+                Problem::unless(
+                    below.plane(channel, plane)? == expected,
+                    "the level is not the previous level at half size",
+                )?;
             }
             Ok(())
         })?;
@@ -283,7 +287,7 @@ fn are_labels(written: &Written, group: &str, labels: &Labels, mut ids: Vec<u32>
     Ok(())
 }
 
-/// Reads the one shard of an array, whatever the type of its values.
+/// Reads the shard of an array with values of any type.
 struct Reader<'a> {
     shard: ShardReader<Cursor<&'a [u8]>>,
     kind: Kind,
@@ -309,9 +313,9 @@ fn broken(error: papsynth_zarr::Error) -> Problem {
     Problem::broken("Zarr", error)
 }
 
-/// The planes of a frame, from the bytes of its image's one shard at full size.
+/// Reads the planes of a frame from the shard of its image at full size.
 fn planes(bytes: &[u8], frame: &FrameSummary, take: &mut Take) -> Result<(), Problem> {
-    let pyramid = of_image(frame).map_err(|error| Problem::unfit(error.to_string()))?;
+    let pyramid = image_pyramid(frame).map_err(|error| Problem::unfit(error.to_string()))?;
     let mut reader = Reader::open(&pyramid.levels()[0], bytes)?;
     let (width, channels) = (frame.width, frame.channels);
     for plane in 0..frame.planes_um.len() {
@@ -325,9 +329,9 @@ fn planes(bytes: &[u8], frame: &FrameSummary, take: &mut Take) -> Result<(), Pro
     Ok(())
 }
 
-/// The planes of a frame of a data set, one after the other.
+/// Calls `take` with each plane of a frame of a data set.
 pub(crate) fn read_planes(folder: &Folder, frame: &FrameSummary, take: &mut Take) -> Result<(), Error> {
-    let array = of_image(frame)?;
+    let array = image_pyramid(frame)?;
     let path = folder.path(&format!("{}/{}", group_of(frame.index), shard_file(0, &array.levels()[0])));
     let bytes = read::bytes(&path, LIMITS.max_file_bytes)?;
     planes(&bytes, frame, take).map_err(Error::input(&path))

@@ -1,11 +1,13 @@
-//! What every format does: it gets each plane as it arrives and, at the end of a frame, everything that is known of it.
+//! Writers of formats: each receives every plane when it is ready, and the ground truth at the end of a frame.
 
+use std::borrow::Cow;
 use std::cell::OnceCell;
 use std::io;
 
 use papsynth::Plane;
 use papsynth::truth::Truth;
 
+use super::depth::{Depth, TRAINING_BITS, to_training};
 use super::format::Layout;
 use crate::error::Error;
 use crate::files::{FileRecord, Folder};
@@ -24,22 +26,22 @@ pub(crate) trait Sink {
 
     fn field(&mut self, field: &Field, files: &mut Files) -> Result<(), Error>;
 
-    /// No further frame follows: the files of the shard get their names.
+    /// Ends the shard: files of several frames are renamed from their temporary names.
     fn close(self: Box<Self>, _: &mut Files) -> Result<(), Error> {
         Ok(())
     }
 }
 
-/// A format whose files are all written when everything is known of their frame.
-pub(super) struct AtOnce(pub(super) fn(&Field, &mut Files) -> Result<(), Error>);
+/// A format that writes all files of a frame at its end.
+pub(super) struct AtEnd(pub(super) fn(&Field, &mut Files) -> Result<(), Error>);
 
-impl Sink for AtOnce {
+impl Sink for AtEnd {
     fn field(&mut self, field: &Field, files: &mut Files) -> Result<(), Error> {
         (self.0)(field, files)
     }
 }
 
-/// A frame of which everything is known.
+/// A complete frame: image, ground truth and COCO document.
 #[derive(Debug)]
 pub(crate) struct Field<'a> {
     /// Seed of the data set.
@@ -47,9 +49,10 @@ pub(crate) struct Field<'a> {
     pub(crate) frame: &'a FrameSummary,
     pub(crate) truth: &'a Truth,
     pub(crate) document: &'a Document,
-    /// Grey levels of the image or, of a stack, with every object in focus.
-    pub(crate) picture: &'a [u16],
+    /// Levels of the image; of a stack, of the all-in-focus image.
+    pub(crate) image: &'a [u16],
     png: OnceCell<Vec<u8>>,
+    training_png: OnceCell<Vec<u8>>,
 }
 
 impl<'a> Field<'a> {
@@ -58,23 +61,33 @@ impl<'a> Field<'a> {
         frame: &'a FrameSummary,
         truth: &'a Truth,
         document: &'a Document,
-        picture: &'a [u16],
+        image: &'a [u16],
     ) -> Self {
-        Self { seed, frame, truth, document, picture, png: OnceCell::new() }
+        Self { seed, frame, truth, document, image, png: OnceCell::new(), training_png: OnceCell::new() }
     }
 
     pub(crate) fn split(&self) -> Split {
         Split::of_slide(self.seed, self.frame.slide)
     }
 
-    /// The picture as PNG, made once for all formats.
-    pub(crate) fn png(&self) -> io::Result<&[u8]> {
-        if let Some(png) = self.png.get() {
+    /// Returns the levels of the image at 8 bits.
+    pub(crate) fn training_image(&self) -> Cow<'a, [u16]> {
+        to_training(self.image, self.frame.bits)
+    }
+
+    /// Returns the image as PNG. It is encoded once for all formats.
+    pub(crate) fn png(&self, depth: Depth) -> io::Result<&[u8]> {
+        let is_camera = depth == Depth::Camera || self.frame.bits <= TRAINING_BITS;
+        let cell = if is_camera { &self.png } else { &self.training_png };
+        if let Some(png) = cell.get() {
             return Ok(png);
         }
-        let FrameSummary { width, channels, bits, pixel_um, .. } = *self.frame;
-        let png = write::png(self.picture, width, channels, bits, pixel_um)?;
-        Ok(self.png.get_or_init(|| png))
+        let FrameSummary { width, channels, bits, training_bits, pixel_um, .. } = *self.frame;
+        let png = match is_camera {
+            true => write::png(self.image, width, channels, bits, pixel_um)?,
+            false => write::png(&self.training_image(), width, channels, training_bits, pixel_um)?,
+        };
+        Ok(cell.get_or_init(|| png))
     }
 }
 
@@ -82,7 +95,7 @@ impl<'a> Field<'a> {
 pub(crate) struct Files<'a> {
     pub(crate) folder: &'a Folder,
     pub(crate) layout: &'a Layout,
-    #[cfg_attr(not(feature = "parquet"), expect(dead_code, reason = "Parquet alone has a file for each split"))]
+    #[cfg_attr(not(feature = "parquet"), expect(dead_code, reason = "only Parquet has a file for each split"))]
     pub(crate) seed: u64,
     pub(crate) shard: u64,
     pub(crate) written: Vec<FileRecord>,
@@ -103,8 +116,8 @@ impl<'a> Files<'a> {
         self.write(name, &bytes)
     }
 
-    pub(crate) fn png(&mut self, name: &str, field: &Field) -> Result<(), Error> {
-        let bytes = field.png().map_err(Error::io("encode", &self.folder.path(name)))?;
+    pub(crate) fn png(&mut self, name: &str, field: &Field, depth: Depth) -> Result<(), Error> {
+        let bytes = field.png(depth).map_err(Error::io("encode", &self.folder.path(name)))?;
         self.write(name, bytes)
     }
 }

@@ -1,5 +1,6 @@
-//! `webdataset`: tar files of many frames. The files of a frame follow each other and share their name up to the first dot:
-//! `json` (its truth as COCO, and its splits), `png` or (of a stack) `ome.tif` and `all-in-focus.png`, `cytoplasm.png` and `nucleus.png` (labels of 16 bits).
+//! `webdataset`: tar files of many frames. The files of a frame are consecutive and have the same name up to the first dot: `json`
+//! (ground truth as COCO, and splits), `png` or, for a stack, `ome.tif` and `all-in-focus.png` (8 bits), `cytoplasm.png` and
+//! `nucleus.png` (labels of 16 bits).
 
 use std::cell::RefCell;
 use std::fs::File;
@@ -11,6 +12,7 @@ use papsynth::Plane;
 use papsynth::truth::Group;
 use serde_json::Value;
 
+use super::depth::{Depth, to_training};
 use super::flat;
 use super::names::numbered;
 use super::ome::{Levels, description, label_tiff, page};
@@ -25,11 +27,11 @@ use crate::write::{PageWriter, fits_16_bits, label_png};
 pub(super) struct Shard {
     tar: tar::Builder<BufWriter<Handle>>,
     pending: Pending,
-    /// The planes of a stack: the tar file wants its size before its bytes.
+    /// The planes of a stack in memory, because a tar header has the size of the file.
     stack: Option<(PageWriter<'static>, Memory)>,
 }
 
-/// A file in memory, of which the writer has one handle and we the other.
+/// A file in memory, shared with the encoder that writes it.
 #[derive(Debug, Clone, Default)]
 struct Memory(Rc<RefCell<Cursor<Vec<u8>>>>);
 
@@ -56,7 +58,7 @@ impl Shard {
         Ok(Self { tar, pending, stack: None })
     }
 
-    /// Adds a file whose head tells nothing but its name and size.
+    /// Adds a file. The header has its name and size; the time is 0, so that equal frames give equal bytes.
     fn add(&mut self, name: &str, bytes: &[u8]) -> Result<(), Error> {
         let mut header = tar::Header::new_ustar();
         header.set_size(bytes.len() as u64);
@@ -102,7 +104,7 @@ impl TarFile {
     }
 
     pub(crate) fn files(&mut self) -> Result<Tar<'_>, Error> {
-        let entries = self.archive.entries().map_err(cannot_be_read(&self.path))?;
+        let entries = self.archive.entries().map_err(read_error(&self.path))?;
         Ok(Tar { path: &self.path, entries })
     }
 
@@ -113,7 +115,7 @@ impl TarFile {
                 return files.bytes(entry);
             }
         }
-        Err(Error::input(files.path)(Problem::broken("tar", format!("it has no file `{name}`"))))
+        Err(Error::input(files.path)(Problem::broken("tar", format!("the archive has no file `{name}`"))))
     }
 }
 
@@ -126,12 +128,12 @@ type Entry<'a> = tar::Entry<'a, BufReader<File>>;
 
 impl<'a> Tar<'a> {
     fn entry(&mut self) -> Result<Option<Entry<'a>>, Error> {
-        self.entries.next().transpose().map_err(cannot_be_read(self.path))
+        self.entries.next().transpose().map_err(read_error(self.path))
     }
 
     fn bytes(&self, entry: Entry) -> Result<Vec<u8>, Error> {
         let mut bytes = Vec::new();
-        entry.take(LIMITS.max_file_bytes).read_to_end(&mut bytes).map_err(cannot_be_read(self.path))?;
+        entry.take(LIMITS.max_file_bytes).read_to_end(&mut bytes).map_err(read_error(self.path))?;
         Ok(bytes)
     }
 
@@ -145,15 +147,15 @@ impl<'a> Tar<'a> {
         match self.next()? {
             None => Ok(()),
             Some((name, _)) => {
-                let what = format!("it has a file `{}` of no frame", name.escape_default());
+                let what = format!("unexpected file `{}` after the last frame", name.escape_default());
                 Err(Error::input(self.path)(Problem::unfit(what)))
             }
         }
     }
 }
 
-/// What the system reads without complaint and is no tar file is broken.
-fn cannot_be_read(path: &Path) -> impl Fn(io::Error) -> Error {
+/// Converts errors of the tar reader: invalid content is an error of the input, everything else of the system.
+fn read_error(path: &Path) -> impl Fn(io::Error) -> Error {
     move |e| match e.kind() {
         io::ErrorKind::Other | io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {
             Error::input(path)(Problem::broken("tar", e))
@@ -170,25 +172,25 @@ pub(super) fn check(written: &Written, tar: &mut Tar) -> Result<(), Error> {
         let path = tar.path.join(&name);
         let ending = name.strip_prefix(&format!("{key}.")).unwrap_or_default();
         let group = flat::GROUPS.into_iter().find(|group| group.name() == part);
-        let looked = match (part, group) {
+        let checked = match (part, group) {
             (_, Some(group)) if [".png", ".tif"].iter().any(|end| ending == format!("{part}{end}")) => {
                 written.labels(&bytes, &written.flat(group))
             }
             ("json", _) if ending == part => {
                 let found = serde_json::from_slice::<Value>(&bytes).map_err(Problem::from);
                 let same = found.map(|found| found == head(field));
-                same.and_then(|same| Problem::unless(same, "it does not say what the record and coco.json say"))
+                same.and_then(|same| Problem::unless(same, "the content differs from the record and coco.json"))
             }
-            ("ome.tif", _) if ending == part => {
-                written.planes(&bytes).and_then(|()| is_described(&bytes, &description(field.frame)))
-            }
-            (_, None) if ending == part => written.picture(&bytes),
+            ("ome.tif", _) if ending == part => written
+                .planes(&bytes, Depth::Training)
+                .and_then(|()| is_described(&bytes, &description(&field.frame.for_training()))),
+            (_, None) if ending == part => written.image(&bytes, Depth::Training),
             _ => {
-                let what = format!("it has `{}` where {key}.{part} is due", name.escape_default());
+                let what = format!("found `{}`; expected {key}.{part}", name.escape_default());
                 return Err(Error::input(tar.path)(Problem::unfit(what)));
             }
         };
-        looked.map_err(Error::input(&path))?;
+        checked.map_err(Error::input(&path))?;
     }
     Ok(())
 }
@@ -197,7 +199,7 @@ impl Sink for Shard {
     fn begin(&mut self, frame: &FrameSummary, _: &Files) -> Result<(), Error> {
         self.stack = None;
         if frame.is_stack() {
-            let (memory, bytes) = (Memory::default(), frame.values() as u64 * frame.planes_um.len() as u64 * 2);
+            let (memory, bytes) = (Memory::default(), frame.values() as u64 * frame.planes_um.len() as u64);
             let writer = PageWriter::new(memory.clone(), bytes).map_err(Error::io("encode", self.pending.path()))?;
             self.stack = Some((writer, memory));
         }
@@ -206,8 +208,10 @@ impl Sink for Shard {
 
     fn plane(&mut self, plane: &Plane, frame: &FrameSummary, _: &Files) -> Result<(), Error> {
         let Some((writer, _)) = &mut self.stack else { return Ok(()) };
+        let levels = to_training(&plane.grey, frame.bits);
+        let frame = &frame.for_training();
         let text = (plane.index == 0).then(|| description(frame));
-        let written = writer.write(Levels::new(&plane.grey, frame).pixels(), &page(frame, text.as_deref()));
+        let written = writer.write(Levels::new(&levels, frame).pixels(), &page(frame, text.as_deref()));
         written.map_err(Error::io("encode", self.pending.path()))
     }
 
@@ -217,10 +221,10 @@ impl Sink for Shard {
         let path = self.pending.path().to_owned();
         self.add(&format!("{key}.json"), &json(&head(field)))?;
         match self.stack.take() {
-            None => self.add(&format!("{key}.png"), field.png().map_err(failed(&path))?)?,
+            None => self.add(&format!("{key}.png"), field.png(Depth::Training).map_err(failed(&path))?)?,
             Some((_, memory)) => {
                 self.add(&format!("{key}.ome.tif"), memory.0.borrow().get_ref())?;
-                self.add(&format!("{key}.all-in-focus.png"), field.png().map_err(failed(&path))?)?;
+                self.add(&format!("{key}.all-in-focus.png"), field.png(Depth::Training).map_err(failed(&path))?)?;
             }
         }
         for group in flat::GROUPS {

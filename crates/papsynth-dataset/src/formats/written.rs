@@ -1,9 +1,10 @@
-//! A frame as it lies in the files of a format, against what the truth says must lie there.
+//! Checks the files of a frame in every format against the ground truth.
 
 use std::cell::OnceCell;
 
 use papsynth::truth::Group;
 
+use super::depth::{Depth, TRAINING_BITS, to_training};
 use super::format::Layout;
 use super::sink::Field;
 use crate::bytes::sha256;
@@ -11,11 +12,11 @@ use crate::error::{Error, Problem};
 use crate::files::Folder;
 use crate::read::{self, LevelImage, Limits};
 
-/// What was written for one frame is read whole.
+/// Limits on the files of one frame.
 pub(crate) const LIMITS: Limits =
     Limits { max_side_px: 1 << 15, max_pixels: 1 << 30, max_file_bytes: 1 << 32, max_regions: 1 << 20 };
 
-/// The levels of a page with as many channels as the frame has: a picture in colour whose pixels are all grey is read as grey.
+/// Returns the levels of a page with the channels of the frame. A colour image in which all pixels are grey is read as grey.
 pub(crate) fn levels(page: LevelImage, channels: usize) -> Vec<u16> {
     match channels / page.channels.max(1) {
         3 => page.levels.iter().flat_map(|&level| [level; 3]).collect(),
@@ -27,60 +28,81 @@ pub(crate) type Take<'a> = dyn FnMut(LevelImage) -> Result<(), Problem> + 'a;
 
 type Read<'a> = dyn FnMut(&mut Take) -> Result<(), Problem> + 'a;
 
-/// A frame of which every file is read again.
+/// A frame whose files are read back.
 pub(crate) struct Written<'a> {
     pub(crate) folder: &'a Folder,
     pub(crate) layout: &'a Layout,
-    /// What is known of it from its shard's record and COCO document; its picture is not among it.
+    /// The frame as its record and COCO document describe it, without image.
     pub(crate) field: &'a Field<'a>,
-    /// SHA-256 of the levels of each plane, and of the picture of a stack, as the first format had them that was read.
-    planes: OnceCell<Vec<String>>,
-    picture: OnceCell<Vec<String>>,
+    planes: Seen,
+    image: Seen,
+}
+
+/// SHA-256 of the levels of each plane in the first format of each bit depth.
+#[derive(Default)]
+struct Seen {
+    camera: OnceCell<Vec<String>>,
+    training: OnceCell<Vec<String>>,
 }
 
 impl<'a> Written<'a> {
     pub(crate) fn new(folder: &'a Folder, layout: &'a Layout, field: &'a Field<'a>) -> Self {
-        Self { folder, layout, field, planes: OnceCell::new(), picture: OnceCell::new() }
+        Self { folder, layout, field, planes: Seen::default(), image: Seen::default() }
     }
 
-    pub(super) fn file(&self, name: &str, look: impl FnOnce(&[u8]) -> Result<(), Problem>) -> Result<(), Error> {
+    pub(super) fn file(&self, name: &str, check: impl FnOnce(&[u8]) -> Result<(), Problem>) -> Result<(), Error> {
         let path = self.folder.inside(name)?;
-        look(&read::bytes(&path, LIMITS.max_file_bytes)?).map_err(Error::input(&path))
+        check(&read::bytes(&path, LIMITS.max_file_bytes)?).map_err(Error::input(&path))
     }
 
-    /// All planes are there and of the size that the record says, and the same in every format.
-    pub(super) fn planes(&self, bytes: &[u8]) -> Result<(), Problem> {
-        self.shown(&mut |take| LevelImage::pages(bytes, &LIMITS, take))
+    /// Checks the planes of an image: number, size and bit depth as in the record, and the same levels in every format.
+    pub(super) fn planes(&self, bytes: &[u8], depth: Depth) -> Result<(), Problem> {
+        self.read_planes(depth, &mut |take| LevelImage::pages(bytes, &LIMITS, take))
     }
 
-    /// The one picture of a frame, the same in every format.
-    pub(crate) fn picture(&self, bytes: &[u8]) -> Result<(), Problem> {
-        self.compare(1, &self.picture, &mut |take| LevelImage::pages(bytes, &LIMITS, take))
+    /// Checks the image of a frame in one plane: the same levels in every format.
+    pub(crate) fn image(&self, bytes: &[u8], depth: Depth) -> Result<(), Problem> {
+        self.compare(1, depth, &self.image, &mut |take| LevelImage::pages(bytes, &LIMITS, take))
     }
 
-    /// All planes, handed over by `read`, are there and of the size that the record says, and the same in every format.
-    pub(super) fn shown(&self, read: &mut Read) -> Result<(), Problem> {
+    /// Checks the planes that `read` reads, as [`planes`](Self::planes) does.
+    pub(super) fn read_planes(&self, depth: Depth, read: &mut Read) -> Result<(), Problem> {
         let frame = self.field.frame;
-        self.compare(frame.planes_um.len(), if frame.is_stack() { &self.planes } else { &self.picture }, read)
+        self.compare(frame.planes_um.len(), depth, if frame.is_stack() { &self.planes } else { &self.image }, read)
     }
 
-    fn compare(&self, planes: usize, seen: &OnceCell<Vec<String>>, read: &mut Read) -> Result<(), Problem> {
+    fn compare(&self, planes: usize, depth: Depth, seen: &Seen, read: &mut Read) -> Result<(), Problem> {
         let frame = self.field.frame;
-        let mut found = Vec::new();
+        let is_deep = frame.bits > TRAINING_BITS;
+        let is_camera = !is_deep || depth == Depth::Camera;
+        let sample_bits = if is_deep && is_camera { 16 } else { 8 };
+        let hash = |levels: &[u16]| sha256(&levels.iter().flat_map(|level| level.to_le_bytes()).collect::<Vec<_>>());
+        let (mut camera, mut training) = (Vec::new(), Vec::new());
         read(&mut |page| {
             let same_size = [page.width, page.height()] == [frame.width, frame.height];
-            Problem::unless(same_size, "it has not the size that the record says")?;
+            Problem::unless(same_size, "the image size differs from the record")?;
+            let bits = if page.white > u16::from(u8::MAX) { 16 } else { 8 };
+            Problem::unless(bits == sample_bits, format!("the samples have {bits} bits; expected {sample_bits}"))?;
             let levels = levels(page, frame.channels);
-            Problem::unless(levels.len() == frame.values(), "it has not the channels that the record says")?;
-            let more = format!("it has more planes than the {planes} that the record says");
-            Problem::unless(found.len() < planes, more)?;
-            found.push(sha256(&levels.iter().flat_map(|level| level.to_le_bytes()).collect::<Vec<_>>()));
+            Problem::unless(levels.len() == frame.values(), "the number of channels differs from the record")?;
+            let more = format!("more than {planes} plane{}; the record has {planes}", plural(planes));
+            Problem::unless(camera.len().max(training.len()) < planes, more)?;
+            if is_camera {
+                camera.push(hash(&levels));
+            }
+            if is_deep {
+                training.push(if is_camera { hash(&to_training(&levels, frame.bits)) } else { hash(&levels) });
+            }
             Ok(())
         })?;
-        let count = found.len();
-        Problem::unless(count == planes, format!("it has {count} planes, the record says {planes}"))?;
-        let same = *seen.get_or_init(|| found.clone()) == found;
-        Problem::unless(same, "it shows other pixels than the image in another format")
+        let count = camera.len().max(training.len());
+        let few = format!("{count} plane{}; the record has {planes}", plural(count));
+        Problem::unless(count == planes, few)?;
+        for (seen, found) in [(&seen.camera, camera), (&seen.training, training)] {
+            let same = found.is_empty() || *seen.get_or_init(|| found.clone()) == found;
+            Problem::unless(same, "the pixels differ from the image in another format")?;
+        }
+        Ok(())
     }
 
     pub(super) fn labels(&self, bytes: &[u8], ids: &[u32]) -> Result<(), Problem> {
@@ -93,13 +115,13 @@ impl<'a> Written<'a> {
         is_of_masks(found.iter().map(|page| &page.ids).eq(layers))
     }
 
-    /// The labels of a group where a pixel has one.
+    /// Returns the labels of a group, one per pixel.
     pub(super) fn flat(&self, group: Group) -> Vec<u32> {
         self.layout.flatten.labels(self.field.truth, group)
     }
 }
 
-/// OME-XML says sizes, channels, units and depths as `expected` does.
+/// Compares sizes, channels, units and depths in the OME-XML of a file with `expected`.
 pub(super) fn is_described(bytes: &[u8], expected: &str) -> Result<(), Problem> {
     let found = read::description(bytes)?.unwrap_or_default();
     let wrong =
@@ -107,10 +129,10 @@ pub(super) fn is_described(bytes: &[u8], expected: &str) -> Result<(), Problem> 
             .into_iter()
             .find(|name| values(&found, name).ne(values(expected, name)))
             .or_else(|| values(&found, "PositionZ").ne(values(expected, "PositionZ")).then_some("PositionZ"));
-    wrong.map_or(Ok(()), |name| Err(Problem::unfit(format!("its OME-XML says another {name} than the record"))))
+    wrong.map_or(Ok(()), |name| Err(Problem::unfit(format!("{name} in the OME-XML differs from the record"))))
 }
 
-/// All values of an attribute.
+/// Returns all values of an attribute.
 fn values<'x>(xml: &'x str, attribute: &str) -> impl Iterator<Item = &'x str> {
     let name = format!(" {attribute}=\"");
     xml.match_indices(&name)
@@ -119,6 +141,10 @@ fn values<'x>(xml: &'x str, attribute: &str) -> impl Iterator<Item = &'x str> {
         .into_iter()
 }
 
+fn plural(count: usize) -> &'static str {
+    if count == 1 { "" } else { "s" }
+}
+
 pub(super) fn is_of_masks(holds: bool) -> Result<(), Problem> {
-    Problem::unless(holds, "it is not what the masks of coco.json give")
+    Problem::unless(holds, "the labels differ from the masks in coco.json")
 }

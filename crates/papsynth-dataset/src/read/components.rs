@@ -7,20 +7,20 @@ use papsynth::truth::{LabelMap, Mask, Run};
 use super::file::Limits;
 use crate::error::Problem;
 
-/// A connected region of one label. Pixels that meet at a corner are connected.
+/// A connected region of one label (8-connectivity).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Component {
     /// The label of its pixels.
     pub label: u32,
     /// Its pixels.
     pub mask: Mask,
-    /// Whether it touches the image's border, so that part of the object may be missing.
+    /// Whether it touches the border of the image, so that part of the object may be missing.
     pub at_border: bool,
 }
 
 impl Component {
-    /// The region alone, as a tile just large enough: its pixels row by row (1 inside, 0 outside), its width, and the
-    /// column and row of its upper left pixel.
+    /// Returns the region within its bounding box: the pixels in row-major order (1 inside, 0 outside), the width, and the column
+    /// and row of the upper left pixel.
     #[must_use]
     pub fn tile(&self) -> (Vec<f32>, usize, [u32; 2]) {
         let Some(bounds) = self.mask.bounds() else { return (Vec::new(), 0, [0, 0]) };
@@ -34,8 +34,8 @@ impl Component {
     }
 }
 
-/// The connected regions of equal labels, in the order of their first pixels. A mask of several objects is a label
-/// image whose labels are all the same.
+/// Returns the connected regions of equal labels, in the order of their first pixels. A binary mask is a label image with one
+/// label.
 ///
 /// # Errors
 /// If there are more regions than the limit.
@@ -61,7 +61,7 @@ pub fn components(labels: &LabelMap, limits: &Limits) -> Result<Vec<Component>, 
         }
         join(&runs, above, first..runs.len(), &mut forest);
         above = first..runs.len();
-        // What does not reach the newest row cannot join any more.
+        // Only regions that reach the current row can still be joined.
         if forest.trees > limits.max_regions.saturating_add(above.len()) {
             break;
         }
@@ -69,18 +69,18 @@ pub fn components(labels: &LabelMap, limits: &Limits) -> Result<Vec<Component>, 
     if forest.trees > limits.max_regions {
         let limit = limits.max_regions;
         return Err(Problem::unfit(format!(
-            "has more than {limit} separate regions; is it a grey image rather than a mask or label image?"
+            "the image has more than {limit} separate regions; expected a mask or label image, not a grey image"
         )));
     }
     Ok(collect(&runs, &mut forest, width, labels.ids.len() / width))
 }
 
-/// Joins the runs of a row with those of the row above that have the same label and touch them.
+/// Joins each run of a row with the touching runs of the row above that have the same label.
 fn join(runs: &[(u32, Run)], above: Range<usize>, row: Range<usize>, forest: &mut Forest) {
     let mut upper = above.start;
     for lower in row {
         let (label, run) = runs[lower];
-        // Runs are sorted: what ends left of this run ends left of all that follow.
+        // Runs are sorted: a run that ends left of this one ends left of all later ones.
         while upper < above.end && runs[upper].1.x1 < run.x0 {
             upper += 1;
         }

@@ -1,4 +1,4 @@
-//! Fields of slides with what is known of their nuclei: folders of images.
+//! Folders of field images, with or without annotated nuclei.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,31 +12,31 @@ use super::nucleus::{image_files, same_size};
 use crate::error::{Error, Problem};
 use papsynth::white_level as white;
 
-/// The table that says which group each image of a folder belongs to.
+/// Table with the group of each image of a folder.
 const GROUPS: &str = "frames.csv";
 
 const GROUP_COLUMNS: [&str; 2] = ["frame", "grade"];
 
 const TABLE_BYTES: u64 = 1 << 26;
 
-/// Bits that cameras fill 16-bit files with.
+/// Bit depths of cameras that write 16-bit files.
 const DEEP: [u32; 3] = [12, 14, 16];
 
-/// Which of three colours is looked at: stains of nuclei and of cytoplasm absorb green most.
+/// The channel that is read of three: stains of nuclei and cytoplasm absorb green most.
 const GREEN: usize = 1;
 
-/// What is known of the nuclei of a field.
+/// Annotated nuclei of a field.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FieldNuclei {
-    /// Nothing.
+    /// No annotation.
     Unknown,
-    /// A point in each: x right, y down, pixels.
+    /// A point in each nucleus: x right, y down, pixels.
     Points(Vec<[f64; 2]>),
-    /// A label in each pixel, row by row; 0 is none.
+    /// A label for each pixel in row-major order; 0 is background.
     Labels(Vec<u32>),
 }
 
-/// The same before it is read.
+/// The file with the annotated nuclei of a field.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum NucleiFile {
     Unknown,
@@ -44,59 +44,60 @@ pub(crate) enum NucleiFile {
     Labels(PathBuf),
 }
 
-/// A field that can be read.
+/// The files of a field.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FieldFile {
-    /// Name of its image, without ending.
+    /// Name of the image without extension.
     pub name: String,
-    /// Its group in `frames.csv`; empty if there is none.
+    /// Group in `frames.csv`, or an empty string.
     pub group: String,
-    /// Size of a pixel, µm, where the files say it.
+    /// Size of a pixel, µm, where the files give it.
     pub pixel_um: Option<f64>,
-    /// Which slide it is of, where the files say it: fields of one slide are stained alike.
+    /// Number of the slide, where the files give it. Fields of one slide have the same staining.
     pub slide: Option<u64>,
     pub(crate) image: PathBuf,
     pub(crate) nuclei: NucleiFile,
-    /// The largest grey level, where the files say it.
+    /// The largest grey level, where the files give it.
     pub(crate) white: Option<u16>,
 }
 
-/// A field.
+/// The image of a field, with its annotated nuclei.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FieldImage {
     /// Columns.
     pub width: usize,
-    /// Grey levels, row by row; of images in colour, green.
+    /// Grey levels in row-major order; of colour images, the green channel.
     pub grey: Vec<u16>,
     /// The grey level of a saturated pixel.
     pub white: u16,
-    /// Its nuclei.
+    /// Annotated nuclei.
     pub nuclei: FieldNuclei,
 }
 
 impl FieldFile {
-    /// Whether its nuclei are known by points or better.
+    /// Whether the nuclei are annotated, with points or masks.
     #[must_use]
     pub fn has_points(&self) -> bool {
         self.nuclei != NucleiFile::Unknown
     }
 
-    /// Whether there are masks of its nuclei.
+    /// Whether the nuclei have masks.
     #[must_use]
     pub fn has_masks(&self) -> bool {
         matches!(self.nuclei, NucleiFile::Labels(_))
     }
 
-    /// The file of its image.
+    /// Path of the image.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.image
     }
 
-    /// Reads it. How bright a saturated pixel is, an image of 16 bits does not tell: 12, 14 or 16 bits are assumed, the fewest that hold it.
+    /// Reads the image and the annotation. A 16-bit image does not give its saturation level: it is that of 12, 14 or 16 bits, the
+    /// smallest that is not below the brightest pixel.
     ///
     /// # Errors
-    /// If a file cannot be read, its masks are of another size than the image, or most of its points lie outside the image.
+    /// If a file cannot be read, the masks differ in size from the image, or most points are outside the image.
     pub fn read(&self, limits: &Limits) -> Result<FieldImage, Error> {
         let image = LevelImage::read(&self.image, limits)?;
         let channel = if image.channels == 3 { GREEN } else { 0 };
@@ -121,7 +122,7 @@ impl FieldFile {
     }
 }
 
-/// The fields of a folder that is no data set, in the order of their names.
+/// Returns the fields of a folder that is not a data set, sorted by name.
 pub(crate) fn files_in(folder: &Path) -> Result<Vec<FieldFile>, Error> {
     let images = match image_files(folder) {
         Err(Error::Input { problem: Problem::NoImages, .. }) if folder.join("images").is_dir() => {
@@ -156,7 +157,7 @@ pub(crate) fn files_in(folder: &Path) -> Result<Vec<FieldFile>, Error> {
     Ok(images.into_iter().map(field).collect())
 }
 
-/// A mask of one value alone becomes one label a connected region.
+/// Gives each connected region of a binary mask a label. Label images are returned unchanged.
 fn separate(labels: LabelMap, limits: &Limits) -> Result<Vec<u32>, Problem> {
     let first = labels.ids.iter().copied().find(|id| *id != 0);
     if labels.ids.iter().any(|id| *id != 0 && Some(*id) != first) {
@@ -172,7 +173,7 @@ fn separate(labels: LabelMap, limits: &Limits) -> Result<Vec<u32>, Problem> {
     Ok(ids)
 }
 
-/// Points of a table of `y,x`, with or without a line that says so.
+/// Parses a table of points `y,x`, with or without a header.
 fn points(bytes: &[u8]) -> Result<Vec<[f64; 2]>, Problem> {
     let mut points = Vec::new();
     for (line, [y, x]) in rows(bytes)? {
@@ -183,7 +184,7 @@ fn points(bytes: &[u8]) -> Result<Vec<[f64; 2]>, Problem> {
             _ => {
                 return Err(Problem::Row {
                     line,
-                    message: format!("`{y},{x}`; two numbers are wanted: y,x in pixels"),
+                    message: format!("found `{y},{x}`; expected two numbers: y,x in pixels"),
                 });
             }
         }
@@ -191,14 +192,14 @@ fn points(bytes: &[u8]) -> Result<Vec<[f64; 2]>, Problem> {
     Ok(points)
 }
 
-/// Refuses points of which most lie outside the image: they are of another one, or x stands before y. A few beyond its border are not
-/// unusual.
+/// Checks that at most half of the points are outside the image. More indicate another image, or x before y; a few outside the
+/// border are common.
 fn within(points: &[[f64; 2]], image: [usize; 2]) -> Result<(), Problem> {
     let inside = |p: &[f64; 2]| (0..2).all(|axis| (-0.5..image[axis] as f64 - 0.5).contains(&p[axis]));
     let outside = points.iter().filter(|p| !inside(p)).count();
     let (count, [width, height]) = (points.len(), image);
     let what = format!(
-        "{outside} of {count} points lie outside the image of {width} x {height} pixels; the columns wanted are y,x in pixels"
+        "{outside} of {count} points are outside the image of {width} x {height} pixels; expected the columns y,x in pixels"
     );
     Problem::unless(2 * outside <= count, what)
 }
@@ -207,7 +208,7 @@ fn groups(bytes: &[u8]) -> Result<BTreeMap<String, String>, Problem> {
     let mut rows = rows(bytes)?.into_iter();
     match rows.next() {
         Some((_, header)) if header == GROUP_COLUMNS => Ok(rows.map(|(_, [frame, grade])| (frame, grade)).collect()),
-        _ => Err(Problem::Row { line: 1, message: format!("the columns wanted are {}", GROUP_COLUMNS.join(",")) }),
+        _ => Err(Problem::Row { line: 1, message: format!("expected the columns {}", GROUP_COLUMNS.join(",")) }),
     }
 }
 
@@ -219,7 +220,7 @@ fn rows(bytes: &[u8]) -> Result<Vec<(u64, [String; 2])>, Problem> {
         let record = record.map_err(|e| Problem::broken("CSV", e))?;
         let line = record.position().map_or(0, csv::Position::line);
         let (Some(a), Some(b), 2) = (record.get(0), record.get(1), record.len()) else {
-            return Err(Problem::Row { line, message: format!("has {} values; two are wanted", record.len()) });
+            return Err(Problem::Row { line, message: format!("{} values; expected 2", record.len()) });
         };
         rows.push((line, [a.trim_start_matches('\u{feff}').to_owned(), b.to_owned()]));
     }
@@ -243,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn points_of_another_image_are_refused() {
+    fn points_outside_the_image_are_refused() {
         let image = [100, 50];
         assert_eq!(within(&[], image), Ok(()));
         assert_eq!(within(&[[99.4, 49.0], [-3.0, 2.0]], image), Ok(()));
@@ -262,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mask_of_one_value_falls_into_its_regions() {
+    fn a_binary_mask_is_split_into_its_regions() {
         let limits = Limits::default();
         let map = |ids: &[u32]| LabelMap { width: 4, ids: ids.to_vec() };
         assert_eq!(separate(map(&[255, 255, 0, 255]), &limits).unwrap(), [1, 1, 0, 2]);

@@ -1,17 +1,17 @@
-//! Files read whole, within limits.
+//! Reading complete files within limits.
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::Path;
 
 use crate::error::{Error, Problem};
 
-/// How large a file may be to be read. All defaults are ours.
+/// Limits on the files that are read. The defaults are choices of this library.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// Largest width and height of an image, pixels. Default 32768, as wide as a field may be.
+    /// Largest width and height of an image, pixels. Default 32768, the largest size of a field.
     pub max_side_px: u32,
-    /// Largest number of pixels of an image. Default 2²⁶, that is 8192 x 8192.
+    /// Largest number of pixels of an image. Default 2²⁶ (8192 x 8192).
     pub max_pixels: u64,
     /// Largest size of a file, bytes. Default 2³⁰.
     pub max_file_bytes: u64,
@@ -26,7 +26,7 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// Refuses an image by its stated size, before anything is allocated for it.
+    /// Checks the size that an image file states, before memory is allocated for it.
     pub(super) fn check(&self, width: u32, height: u32) -> Result<(), Problem> {
         let pixels = u64::from(width) * u64::from(height);
         if width.max(height) > self.max_side_px || pixels > self.max_pixels || pixels == 0 {
@@ -49,17 +49,22 @@ pub(super) fn parse<T>(
     parse(&bytes(path, limits.max_file_bytes)?).map_err(Error::input(path))
 }
 
-/// The bytes of a file of at most `limit` bytes.
+/// Reads a regular file of at most `limit` bytes.
 pub(crate) fn bytes(path: &Path, limit: u64) -> Result<Vec<u8>, Error> {
     let failed = |e: io::Error| match e.kind() {
         io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Error::input(path)(Problem::Missing("file")),
         io::ErrorKind::IsADirectory => Error::input(path)(Problem::Folder),
         _ => Error::io("read", path)(e),
     };
+    // Before the file is opened, because to open a named pipe waits for a writer.
+    let metadata = fs::metadata(path).map_err(failed)?;
+    if !metadata.is_file() && !metadata.is_dir() {
+        return Err(Error::input(path)(Problem::NotAFile));
+    }
     let file = File::open(path).map_err(failed)?;
-    let size = file.metadata().map_err(failed)?.len();
+    let size = metadata.len();
     let mut bytes = Vec::new();
-    // A device or a growing file may hold more than it says.
+    // A growing file may have more bytes than its metadata state.
     file.take(limit.saturating_add(1)).read_to_end(&mut bytes).map_err(failed)?;
     let read = bytes.len() as u64;
     if read > limit {

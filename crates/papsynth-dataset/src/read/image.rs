@@ -5,6 +5,7 @@ use std::path::Path;
 use papsynth::truth::LabelMap;
 
 use super::file::{Limits, parse};
+use super::jpeg;
 use super::raster::{Channels, Meaning, Raster, Samples, decode_png};
 use super::tiff;
 use crate::error::{Error, Problem};
@@ -19,18 +20,18 @@ const TIFF_SIGNATURES: [&[u8]; 4] = [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"];
 pub struct GreyImage {
     /// Columns.
     pub width: usize,
-    /// Grey levels `0..=white`, row by row.
+    /// Grey levels `0..=white` in row-major order.
     pub grey: Vec<u16>,
-    /// The largest grey level that the file could hold: 255 or 65535. A camera of 12 bits fills only the lowest
-    /// sixteenth of a 16-bit file.
+    /// Largest grey level of the sample type: 255 or 65535. A 12-bit camera uses only 1/16 of the range of a 16-bit
+    /// file.
     pub white: u16,
 }
 
 impl GreyImage {
-    /// Decodes a PNG or TIFF file.
+    /// Decodes a PNG, JPEG or TIFF file.
     ///
     /// # Errors
-    /// If the bytes are not a whole image of grey pixels within the limits.
+    /// If the bytes are not a complete image of grey pixels within the limits.
     pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Self, Problem> {
         Self::of(decode(bytes, limits, Meaning::Brightness)?)
     }
@@ -41,10 +42,10 @@ impl GreyImage {
         Ok(Self { width, grey, white })
     }
 
-    /// Reads a PNG or TIFF file.
+    /// Reads a PNG, JPEG or TIFF file.
     ///
     /// # Errors
-    /// If the file cannot be read, or is not a whole image of grey pixels within the limits.
+    /// If the file cannot be read, or is not a complete image of grey pixels within the limits.
     pub fn read(path: &Path, limits: &Limits) -> Result<Self, Error> {
         parse(path, limits, |bytes| Self::decode(bytes, limits))
     }
@@ -55,7 +56,7 @@ impl GreyImage {
         self.grey.len() / self.width.max(1)
     }
 
-    /// Grey levels as fractions of [`white`](Self::white), 0 to 1.
+    /// Grey levels divided by [`white`](Self::white), 0 to 1.
     #[must_use]
     pub fn fractions(&self) -> Vec<f32> {
         let white = f32::from(self.white.max(1));
@@ -70,17 +71,17 @@ pub struct LevelImage {
     pub width: usize,
     /// 1, or 3 for red, green and blue.
     pub channels: usize,
-    /// Levels `0..=white`, row by row, the channels of a pixel side by side.
+    /// Levels `0..=white` in row-major order, channels interleaved.
     pub levels: Vec<u16>,
-    /// The largest level that the file could hold: 255 or 65535.
+    /// Largest level of the sample type: 255 or 65535.
     pub white: u16,
 }
 
 impl LevelImage {
-    /// Decodes a PNG or TIFF file.
+    /// Decodes a PNG, JPEG or TIFF file.
     ///
     /// # Errors
-    /// If the bytes are not a whole image of opaque pixels within the limits.
+    /// If the bytes are not a complete image of opaque pixels within the limits.
     pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Self, Problem> {
         Self::of(decode(bytes, limits, Meaning::Brightness)?)
     }
@@ -95,7 +96,7 @@ impl LevelImage {
         Ok(Self { width, channels: 3, levels, white })
     }
 
-    /// Hands over the images of a file, one after the other: a PNG file has one, a TIFF file may have several.
+    /// Calls `take` with each image of a file, in order. A TIFF file may have several images, other files have one.
     pub(crate) fn pages(
         bytes: &[u8],
         limits: &Limits,
@@ -107,10 +108,10 @@ impl LevelImage {
         }
     }
 
-    /// Reads a PNG or TIFF file.
+    /// Reads a PNG, JPEG or TIFF file.
     ///
     /// # Errors
-    /// If the file cannot be read, or is not a whole image of opaque pixels within the limits.
+    /// If the file cannot be read, or is not a complete image of opaque pixels within the limits.
     pub fn read(path: &Path, limits: &Limits) -> Result<Self, Error> {
         parse(path, limits, |bytes| Self::decode(bytes, limits))
     }
@@ -134,15 +135,15 @@ fn levels(samples: Samples) -> Result<(Vec<u16>, u16), Problem> {
     }
 }
 
-/// Decodes a PNG or TIFF file of labels; 0 is no object.
+/// Decodes a PNG or TIFF file of labels; 0 is background.
 ///
 /// # Errors
-/// If the bytes are not a whole image of one channel within the limits.
+/// If the bytes are not a complete image of one channel within the limits.
 pub fn label_map(bytes: &[u8], limits: &Limits) -> Result<LabelMap, Problem> {
     labels(decode(bytes, limits, Meaning::Labels)?)
 }
 
-/// The label images of a TIFF file, one a page; more than `most` are refused.
+/// Reads the label images of a TIFF file, one per page. More than `most` pages are an error.
 pub(crate) fn label_pages(bytes: &[u8], limits: &Limits, most: usize) -> Result<Vec<LabelMap>, Problem> {
     let mut pages = Vec::new();
     tiff::pages(bytes, limits, &mut |raster| {
@@ -168,10 +169,10 @@ fn labels(raster: Raster) -> Result<LabelMap, Problem> {
     Ok(LabelMap { width, ids })
 }
 
-/// Reads a PNG or TIFF file of labels; 0 is no object.
+/// Reads a PNG or TIFF file of labels; 0 is background.
 ///
 /// # Errors
-/// If the file cannot be read, or is not a whole image of one channel within the limits.
+/// If the file cannot be read, or is not a complete image of one channel within the limits.
 pub fn read_label_map(path: &Path, limits: &Limits) -> Result<LabelMap, Error> {
     parse(path, limits, |bytes| label_map(bytes, limits))
 }
@@ -180,7 +181,12 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits, meaning: Meaning) -> Result<
     if bytes.starts_with(PNG_SIGNATURE) {
         decode_png(bytes, limits, meaning)
     } else if is_tiff(bytes) {
-        tiff::decode(bytes, limits)
+        tiff::decode(bytes, limits, meaning)
+    } else if bytes.starts_with(jpeg::SIGNATURE) {
+        match meaning {
+            Meaning::Brightness => jpeg::decode(bytes, limits),
+            Meaning::Labels => Err(jpeg::lossy_labels()),
+        }
     } else if bytes.len() < PNG_SIGNATURE.len() && PNG_SIGNATURE.starts_with(bytes) && !bytes.is_empty() {
         Err(Problem::Truncated("PNG"))
     } else {

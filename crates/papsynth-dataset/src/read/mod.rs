@@ -1,19 +1,24 @@
-//! Reading what users bring: images, masks, label fields, outlines, weight maps.
+//! Readers of the users' files: images, masks, label images, outlines, weight maps.
 //!
-//! Everything here is a function of bytes, with a twin that reads a file and names it in its errors. Sizes are checked
-//! against [`Limits`] before anything is decoded.
+//! Each format has a function that parses bytes and one that reads a file; errors of the second name the file. Sizes are
+//! checked against [`Limits`] before an image is decoded. Only regular files are read.
 //!
-//! # What is accepted
+//! # Accepted images
 //!
-//! PNG of 1 to 16 bits and TIFF of 8, 16 or (label images only) 32 bits. An image in colour is refused, but for
-//! [`LevelImage`], which keeps its channels: how much light of one wavelength a colour stands for is not known. Fields that
-//! are compared are read in green ([`FieldFile`]). A colour file whose pixels are all grey (R = G = B, opaque) is read as
-//! grey. In label images and masks a palette is not looked at, its indices are the labels.
+//! - PNG of 1 to 16 bits.
+//! - TIFF of 8, 16 or (label images only) 32 bits: uncompressed, LZW, Deflate, PackBits or JPEG.
+//! - JPEG, grey or in colour. Label images and masks in JPEG are an error, because lossy compression changes labels. The
+//!   EXIF orientation is not applied.
+//!
+//! Colour images are an error, because the response of a colour camera at one wavelength is unknown. Two readers accept
+//! colour: [`LevelImage`] keeps the channels, and [`FieldFile`] takes the green one. A colour file in which all pixels are
+//! grey (R = G = B, opaque) is read as grey. In label images and masks with a palette the indices are the labels.
 
 mod components;
 mod fields;
 mod file;
 mod image;
+mod jpeg;
 mod nucleus;
 mod outlines;
 mod raster;

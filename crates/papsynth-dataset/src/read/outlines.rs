@@ -1,4 +1,4 @@
-//! Outlines as a table of points.
+//! Tables of outline points.
 
 use std::path::Path;
 
@@ -7,24 +7,24 @@ use crate::error::{Error, Problem};
 
 const COLUMNS: [&str; 4] = ["outline", "k", "x_px", "y_px"];
 
-/// A closed outline of fewer points has no area.
+/// Fewest points of a closed outline with an area.
 const MIN_POINTS: usize = 3;
 
 /// A closed outline.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outline {
-    /// What its table calls it.
+    /// Name in the table.
     pub name: String,
-    /// Its points, pixels; the last is joined to the first.
+    /// Points, pixels; the last is joined to the first.
     pub points: Vec<[f64; 2]>,
 }
 
-/// Parses a CSV table with the columns `outline` (a name), `k` (0, 1, 2, … along each outline), `x_px` and `y_px`, in any
-/// order of columns. The points of an outline stand together.
+/// Parses a CSV table with the columns `outline` (a name), `k` (0, 1, 2, … along each outline), `x_px` and `y_px`. Columns may be in
+/// any order; the rows of an outline are consecutive.
 ///
 /// # Errors
-/// If a column is missing, a number cannot be read or is not finite, points are missing or out of order, or an outline
-/// has fewer than three; with the line.
+/// If a column is missing, a number is invalid or not finite, points are missing or out of order, or an outline has fewer
+/// than three points. The error gives the line.
 pub fn outlines(bytes: &[u8]) -> Result<Vec<Outline>, Problem> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
     let header = reader.headers().map_err(broken)?;
@@ -32,7 +32,7 @@ pub fn outlines(bytes: &[u8]) -> Result<Vec<Outline>, Problem> {
     for (place, name) in places.iter_mut().zip(COLUMNS) {
         *place = header.iter().position(|h| h.trim_start_matches('\u{feff}') == name).ok_or_else(|| Problem::Row {
             line: 1,
-            message: format!("there is no column `{name}`; wanted are {}", COLUMNS.join(",")),
+            message: format!("the column `{name}` is missing; expected the columns {}", COLUMNS.join(",")),
         })?;
     }
     let mut outlines: Vec<Outline> = Vec::new();
@@ -43,7 +43,7 @@ pub fn outlines(bytes: &[u8]) -> Result<Vec<Outline>, Problem> {
         let wrong = |message: String| Problem::Row { line, message };
         let number = |column: &str, text: &str| match text.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(wrong(format!("{column} is `{text}`; a finite number is wanted"))),
+            _ => Err(wrong(format!("{column} is `{text}`; expected a finite number"))),
         };
         let point = [number("x_px", x)?, number("y_px", y)?];
         if outlines.last().is_none_or(|last| last.name != name) {
@@ -52,7 +52,7 @@ pub fn outlines(bytes: &[u8]) -> Result<Vec<Outline>, Problem> {
         let Some(last) = outlines.last_mut() else { continue };
         if k.parse() != Ok(last.points.len()) {
             return Err(wrong(format!(
-                "k is `{k}`; {} is wanted, the next point of outline `{name}`",
+                "k is `{k}`; expected {}, the next point of outline `{name}`",
                 last.points.len()
             )));
         }
@@ -60,18 +60,22 @@ pub fn outlines(bytes: &[u8]) -> Result<Vec<Outline>, Problem> {
     }
     match outlines.iter().find(|o| o.points.len() < MIN_POINTS) {
         Some(Outline { name, points }) => {
-            let message = format!("outline `{name}` has {} points; at least {MIN_POINTS} are wanted", points.len());
+            let message = format!(
+                "outline `{name}` has {} point{}; expected at least {MIN_POINTS}",
+                points.len(),
+                if points.len() == 1 { "" } else { "s" }
+            );
             Err(Problem::broken("CSV", message))
         }
-        None if outlines.is_empty() => Err(Problem::broken("CSV", "it has no outline")),
+        None if outlines.is_empty() => Err(Problem::broken("CSV", "the table has no outline")),
         None => Ok(outlines),
     }
 }
 
-/// Reads a CSV table as [`outlines`] parses it.
+/// Reads a CSV file and parses it with [`outlines`].
 ///
 /// # Errors
-/// If the file cannot be read, or as [`outlines`].
+/// If the file cannot be read; see also [`outlines`].
 pub fn read_outlines(path: &Path, limits: &Limits) -> Result<Vec<Outline>, Error> {
     parse(path, limits, outlines)
 }

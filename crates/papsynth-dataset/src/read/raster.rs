@@ -1,4 +1,4 @@
-//! What both image formats decode to, before it is known what it is for; and PNG.
+//! Decoded images of all formats, and PNG.
 
 use std::io::{Cursor, ErrorKind};
 
@@ -7,7 +7,7 @@ use png::{BitDepth, ColorType, Decoder, DecodingError, Transformations};
 use super::file::Limits;
 use crate::error::Problem;
 
-/// Samples as they stand in the file, row by row, channels interleaved.
+/// Samples as stored in the file, in row-major order, channels interleaved.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Samples {
     U8(Vec<u8>),
@@ -45,7 +45,7 @@ pub(super) struct Raster {
 }
 
 impl Raster {
-    /// The one channel of an image whose pixels are all grey and opaque.
+    /// Returns one channel, if all pixels are grey and opaque.
     pub(super) fn grey(self) -> Result<Samples, Problem> {
         let (channels, width) = (self.channels, self.width);
         Ok(match self.samples {
@@ -81,13 +81,13 @@ fn grey<T: Copy + PartialEq>(samples: Vec<T>, channels: Channels, opaque: T, wid
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Meaning {
-    /// Brightness: fewer than 8 bits are widened to the full range, a palette is looked up.
+    /// Brightness: fewer than 8 bits are scaled to the full range, palette indices become colours.
     Brightness,
-    /// Labels: kept as they are; of a palette, the indices.
+    /// Labels: values are kept; with a palette, the indices.
     Labels,
 }
 
-/// What the decoder may allocate for chunks other than the image: none of them is used.
+/// Memory limit of the decoder for chunks other than image data, which are not used.
 const CHUNK_BYTES: usize = 1 << 20;
 
 pub(super) fn decode_png(bytes: &[u8], limits: &Limits, meaning: Meaning) -> Result<Raster, Problem> {
@@ -104,7 +104,7 @@ pub(super) fn decode_png(bytes: &[u8], limits: &Limits, meaning: Meaning) -> Res
     let size = reader.output_buffer_size().ok_or_else(|| problem(DecodingError::LimitsExceeded))?;
     let mut buffer = vec![0; size];
     let frame = reader.next_frame(&mut buffer).map_err(problem)?;
-    // To the end: a file that lacks only its last chunk was cut, too.
+    // Up to the last chunk, so that a file without it counts as truncated.
     reader.finish().map_err(problem)?;
     let width = frame.width as usize;
     let channels = match frame.color_type {
@@ -121,7 +121,7 @@ pub(super) fn decode_png(bytes: &[u8], limits: &Limits, meaning: Meaning) -> Res
     Ok(Raster { width, channels, samples })
 }
 
-/// Samples of 1, 2 or 4 bits, of which the first stands in the highest bits of a byte; rows begin at a byte.
+/// Unpacks samples of 1, 2 or 4 bits. The first sample is in the highest bits of a byte; each row starts at a byte.
 fn unpack(rows: &[u8], bits: usize, width: usize, line_size: usize) -> Vec<u8> {
     let mask = u8::MAX >> (8 - bits);
     let row = |line: &[u8]| -> Vec<u8> {

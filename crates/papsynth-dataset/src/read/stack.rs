@@ -1,4 +1,4 @@
-//! Focus stacks: planes of one size.
+//! Focus stacks: planes of the same size.
 
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
@@ -10,24 +10,24 @@ use super::raster::{Meaning, Raster, Samples};
 use super::tiff;
 use crate::error::{Error, Problem};
 
-/// Largest number of pixels of all planes: a GiB in memory.
+/// Largest number of pixels of all planes: 1 GiB in memory.
 const MOST_PIXELS: u64 = 1 << 28;
 
-/// Planes of one size, in the units of their files.
+/// A focus stack: planes of the same size, in the units of their files.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Stack {
     /// Columns of each plane.
     pub width: usize,
-    /// The planes, row by row.
+    /// The planes, each in row-major order.
     pub planes: Vec<Vec<f32>>,
 }
 
 impl Stack {
-    /// Reads a stack: a TIFF file of several pages, a folder of PNG or TIFF files, or several such files. A folder's files,
-    /// and files of one folder, are taken in the [order of the numbers in their names](natural_order).
+    /// Reads a stack: a TIFF file of several pages, a folder of PNG, JPEG or TIFF files, or several of these files. Files of one
+    /// folder are sorted by the [numbers in their names](natural_order).
     ///
     /// # Errors
-    /// If a file cannot be read, is no grey image within the limits, or of another size than the first.
+    /// If a file cannot be read, is not a grey image within the limits, or differs in size from the first.
     pub fn read(paths: &[PathBuf], limits: &Limits) -> Result<Self, Error> {
         let mut files = Vec::new();
         for path in paths {
@@ -48,7 +48,7 @@ impl Stack {
     /// Decodes a stack in one file.
     ///
     /// # Errors
-    /// If the bytes are not whole grey images of one size within the limits.
+    /// If the bytes are not complete grey images of the same size within the limits.
     pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Self, Problem> {
         let mut stack = Self::default();
         stack.add(bytes, limits)?;
@@ -71,7 +71,7 @@ impl Stack {
 
     fn push(&mut self, raster: Raster) -> Result<(), Problem> {
         let width = raster.width;
-        #[expect(clippy::cast_precision_loss, reason = "32 bits hold more than any sensor measures")]
+        #[expect(clippy::cast_precision_loss, reason = "sensors have at most 24 bits")]
         let plane: Vec<f32> = match raster.grey()? {
             Samples::U8(samples) => samples.into_iter().map(f32::from).collect(),
             Samples::U16(samples) => samples.into_iter().map(f32::from).collect(),
@@ -79,12 +79,12 @@ impl Stack {
             Samples::F32(samples) => samples,
         };
         if plane.iter().any(|v| !v.is_finite()) {
-            return Err(Problem::samples("samples that are infinite or no numbers", "finite grey samples"));
+            return Err(Problem::samples("infinite or NaN samples", "finite grey samples"));
         }
         let (found, first) = ([width, plane.len() / width.max(1)], [self.width, self.height()]);
         if !self.planes.is_empty() && found != first {
             return Err(Problem::unfit(format!(
-                "plane {} is {} x {}, the first {} x {}; all must be the same",
+                "plane {} is {} x {} pixels, the first {} x {}; expected planes of the same size",
                 self.planes.len(),
                 found[0],
                 found[1],
@@ -94,7 +94,7 @@ impl Stack {
         }
         if (self.planes.len() as u64 + 1) * plane.len() as u64 > MOST_PIXELS {
             return Err(Problem::unfit(format!(
-                "the stack has more than {MOST_PIXELS} pixels up to this file; crop it, or take fewer planes"
+                "with this file the stack has more than {MOST_PIXELS} pixels; crop the images, or use fewer planes"
             )));
         }
         self.width = width;
@@ -107,7 +107,7 @@ fn name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// The order of names in which numbers count as numbers: `plane2` stands before `plane10`.
+/// Compares names with numbers in them by value: `plane2` sorts before `plane10`.
 #[must_use]
 pub fn natural_order(a: &str, b: &str) -> Ordering {
     let (mut a_rest, mut b_rest) = (a, b);
@@ -124,14 +124,14 @@ pub fn natural_order(a: &str, b: &str) -> Ordering {
             return order;
         }
         if a_tail.is_empty() || b_tail.is_empty() {
-            // Names that differ in leading zeros alone still have an order.
+            // Names that differ only in leading zeros.
             return a_tail.len().cmp(&b_tail.len()).then_with(|| a.cmp(b));
         }
         (a_rest, b_rest) = (a_tail, b_tail);
     }
 }
 
-/// The digits, or all but digits, that a text begins with, and the rest.
+/// Splits a text after its leading run of digits or of other characters.
 fn split(text: &str) -> (&str, &str) {
     let digits = text.starts_with(|c: char| c.is_ascii_digit());
     let end = text.find(|c: char| c.is_ascii_digit() != digits).unwrap_or(text.len());
@@ -174,12 +174,12 @@ mod tests {
         assert_eq!(deep, Stack { width: 1, planes: vec![vec![1.0, 65_535.0]] });
         let float = decode(&pages::<colortype::Gray32Float>(&[&[0.25, -1.5], &[0.5, 1e9]], 2)).unwrap();
         assert_eq!(float.planes, [[0.25, -1.5], [0.5, 1e9]]);
-        // Grey in the guise of colour.
+        // A colour file with grey pixels.
         assert_eq!(decode(&pages::<colortype::RGB8>(&[&[7, 7, 7, 9, 9, 9]], 2)).unwrap().planes, [[7.0, 9.0]]);
     }
 
     #[test]
-    fn planes_that_are_no_stack_are_refused() {
+    fn invalid_stacks_are_refused() {
         let nan = pages::<colortype::Gray32Float>(&[&[0.5, f32::NAN]], 2);
         assert!(matches!(decode(&nan), Err(Problem::Samples { .. })));
         assert!(matches!(decode(&pages::<colortype::Gray64Float>(&[&[0.5]], 1)), Err(Problem::Samples { .. })));
@@ -187,7 +187,7 @@ mod tests {
         assert!(matches!(decode(b"no image"), Err(Problem::Format)));
         let good = pages::<colortype::Gray8>(&[&[0, 255], &[3, 4]], 2);
         for end in 0..good.len() {
-            // Whatever is cut off, it is refused or lacks nothing of what it claims to hold.
+            // A truncated file is refused, or all of its pages are complete.
             if let Ok(stack) = decode(&good[..end]) {
                 assert!(stack.planes.iter().all(|plane| plane.len() == 2));
             }
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_is_read_in_the_order_of_its_numbers() {
+    fn files_of_a_folder_are_sorted_by_number() {
         let scratch = Scratch::new("stack");
         for (name, value) in [("z10", 10), ("z9", 9), ("z2", 2)] {
             fs::write(scratch.join(&format!("{name}.tif")), pages::<colortype::Gray8>(&[&[value]], 1)).unwrap();
@@ -207,12 +207,15 @@ mod tests {
         assert_eq!(planes(&["z10.tif", "z2.tif"].map(|name| scratch.join(name))).unwrap(), [2.0, 10.0]);
         fs::write(scratch.join("z11.tif"), pages::<colortype::Gray8>(&[&[1, 2]], 1)).unwrap();
         let error = planes(&[scratch.path().to_owned()]).unwrap_err().to_string();
-        assert!(error.ends_with("z11.tif: plane 3 is 1 x 2, the first 1 x 1; all must be the same"), "{error}");
+        assert!(
+            error.ends_with("z11.tif: plane 3 is 1 x 2 pixels, the first 1 x 1; expected planes of the same size"),
+            "{error}"
+        );
         assert!(planes(&[scratch.join("missing.tif")]).unwrap_err().to_string().contains("no such file"));
     }
 
     #[test]
-    fn numbers_in_names_count_as_numbers() {
+    fn numbers_in_names_are_compared_by_value() {
         let mut names = ["b", "a10", "a9", "a", "a09", "10", "9", "a9b2", "a9b10"];
         names.sort_by(|a, b| natural_order(a, b));
         assert_eq!(names, ["9", "10", "a", "a09", "a9", "a9b2", "a9b10", "a10", "b"]);

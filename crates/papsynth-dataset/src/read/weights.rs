@@ -1,4 +1,4 @@
-//! Weight maps, and what else a recipe names.
+//! Files that a recipe names: density maps and label images.
 
 use std::path::Path;
 
@@ -9,26 +9,27 @@ use papsynth::truth::LabelMap;
 
 use super::file::{Limits, bytes};
 use super::image::{GreyImage, PNG_SIGNATURE, label_map};
+use super::jpeg;
 use crate::bytes::sha256;
 use crate::error::{Error, Problem};
 
 /// A file that a recipe names.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct InputFile {
-    /// Its name in the recipe and in the data set, which tells its content.
+    /// Name in the recipe and in the data set; contains the start of its SHA-256.
     pub name: String,
-    /// What is in it.
+    /// Content.
     pub bytes: Vec<u8>,
 }
 
-/// Reads the file that a recipe names, if it names one, relative to `folder` (where the recipe lies). In the recipe it then has a
-/// name that tells its content, so that recipes with different maps differ.
+/// Reads the file that a recipe names, if it names one, relative to `folder` (that of the recipe). The path in the recipe is then
+/// replaced by a name with the hash of the content, so that recipes with different maps differ.
 ///
 /// # Errors
-/// If the file cannot be read, or allows no place.
+/// If the file cannot be read, or all of its pixels are 0.
 pub fn read_inputs(recipe: &mut Recipe, folder: &Path, limits: &Limits) -> Result<(Inputs, Option<InputFile>), Error> {
-    let is_grey = matches!(recipe.layout, Layout::Map { .. });
-    let (Layout::Map { path } | Layout::Labels(Labels { path, .. })) = &mut recipe.layout else {
+    let is_grey = matches!(recipe.layout, Layout::DensityMap { .. });
+    let (Layout::DensityMap { path } | Layout::Labels(Labels { path, .. })) = &mut recipe.layout else {
         return Ok((Inputs::default(), None));
     };
     let found = folder.join(&path);
@@ -39,7 +40,7 @@ pub fn read_inputs(recipe: &mut Recipe, folder: &Path, limits: &Limits) -> Resul
     Ok((Inputs { weight_map: Some(map), ..Inputs::default() }, Some(file)))
 }
 
-/// Of an image brightness as weight, 0 where black and 1 at the file's largest grey level; of labels 1 where one lies.
+/// Returns the weights: of an image, levels divided by the largest level of its type; of labels, 1 inside objects.
 fn weights(bytes: &[u8], is_grey: bool, limits: &Limits) -> Result<WeightMap, Problem> {
     let map = if is_grey {
         let image = GreyImage::decode(bytes, limits)?;
@@ -49,11 +50,15 @@ fn weights(bytes: &[u8], is_grey: bool, limits: &Limits) -> Result<WeightMap, Pr
         WeightMap { width, weights: ids.iter().map(|&id| if id > 0 { 1.0 } else { 0.0 }).collect() }
     };
     let has_place = map.weights.iter().any(|&w| w > 0.0);
-    Problem::unless(has_place, "every pixel is 0, so that no place is allowed; some must be above 0").map(|()| map)
+    Problem::unless(has_place, "all pixels are 0; expected at least one pixel above 0").map(|()| map)
 }
 
-/// The name of a map in a data set: by the beginning of its SHA-256.
+/// Returns the name of a map in a data set, from the start of its SHA-256.
 fn content_name(bytes: &[u8]) -> String {
-    let ending = if bytes.starts_with(PNG_SIGNATURE) { "png" } else { "tif" };
+    let ending = match bytes {
+        _ if bytes.starts_with(PNG_SIGNATURE) => "png",
+        _ if bytes.starts_with(jpeg::SIGNATURE) => "jpg",
+        _ => "tif",
+    };
     format!("layout-{:.16}.{ending}", sha256(bytes))
 }

@@ -1,4 +1,4 @@
-//! Closing a slide: the upper levels of its pyramids, a thumbnail, a card.
+//! The last step of a slide: the upper levels of its pyramids, a thumbnail, a card.
 
 use std::ops::Range;
 
@@ -15,37 +15,37 @@ use crate::files::{Check, FileRecord};
 use crate::formats::HAS_PARQUET;
 use crate::write;
 
-/// Longer side of the thumbnail at most, px.
+/// Largest width and height of the thumbnail, px.
 const THUMBNAIL_PX: usize = 1024;
 
-/// A closed slide.
+/// Counts of a finished slide.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Finished {
-    /// Shards.
+pub struct SlideSummary {
+    /// Number of shards.
     pub shards: u64,
-    /// Objects and parts of cells.
+    /// Number of objects and parts of cells.
     pub objects: u64,
-    /// Bytes of all files.
+    /// Size of all files, bytes.
     pub bytes: u64,
-    /// SHA-256 over names, sizes and hashes of all files: two slides of one hash are the same.
+    /// SHA-256 of names, sizes and hashes of all files: slides with equal roots are equal.
     pub root_sha256: String,
 }
 
 impl SlideSet {
-    /// Makes what follows from the shards, which must all be whole: the upper levels, `thumbnail.png` and `README.md`. What is there
-    /// already and the same is made again and not touched. `check` says how carefully the files of shards are looked at before.
+    /// Writes the files that are computed from all shards: the upper levels, `thumbnail.png` and `README.md`. `check`
+    /// is the check of the shards before. Files with the same content are not rewritten.
     ///
     /// # Errors
-    /// If a shard is missing or not whole, which is said, or the system refuses.
-    pub fn finish(&self, check: Check) -> Result<Finished, Error> {
+    /// If a shard is missing or damaged, or a file cannot be read or written.
+    pub fn finish(&self, check: Check) -> Result<SlideSummary, Error> {
         let missing = self.missing(check)?;
         if let Some(&first) = missing.first() {
             return Err(Error::folder(
                 self.path(),
                 format!(
-                    "{} of {} shards are missing or damaged, the first is {}; `papsynth slide make --verify` with the same recipe makes them",
+                    "missing or damaged shards: {} of {}, first {}; generate them with `papsynth slide make --verify`",
                     missing.len(),
-                    self.all().count(),
+                    self.all_shards().count(),
                     name_of(first)
                 ),
             ));
@@ -53,20 +53,20 @@ impl SlideSet {
         let mut files = Vec::new();
         for plane in 0..self.head.planes_um.len() {
             if self.head.bits <= 8 {
-                self.upper::<u8>(&self.forms.image, None, plane, halved, &mut files)?;
+                self.upper::<u8>(&self.pyramids.image, None, plane, halved, &mut files)?;
             } else {
-                self.upper::<u16>(&self.forms.image, None, plane, halved, &mut files)?;
+                self.upper::<u16>(&self.pyramids.image, None, plane, halved, &mut files)?;
             }
         }
         for group in Group::ALL {
-            self.upper::<u32>(&self.forms.labels, Some(group.name()), 0, halved_labels, &mut files)?;
+            self.upper::<u32>(&self.pyramids.labels, Some(group.name()), 0, halved_labels, &mut files)?;
         }
-        self.upper::<u16>(&self.forms.layers, Some(LAYERS), 0, halved_labels, &mut files)?;
+        self.upper::<u16>(&self.pyramids.layers, Some(LAYERS), 0, halved_labels, &mut files)?;
         files.push(self.folder.keep(THUMBNAIL, &self.thumbnail()?)?);
         let mut objects = 0;
         let mut all: Vec<FileRecord> = Vec::new();
-        for at in self.all() {
-            let Some(record) = self.whole(at, Check::Sizes)? else { continue };
+        for at in self.all_shards() {
+            let Some(record) = self.complete_record(at, Check::Sizes)? else { continue };
             objects += record.objects;
             all.extend(record.files);
         }
@@ -79,15 +79,15 @@ impl SlideSet {
         for file in &all {
             hash.update(format!("{}\0{}\0{}\n", file.path, file.bytes, file.sha256).as_bytes());
         }
-        Ok(Finished {
-            shards: self.all().count() as u64,
+        Ok(SlideSummary {
+            shards: self.all_shards().count() as u64,
             objects,
             bytes: all.iter().map(|file| file.bytes).sum(),
             root_sha256: hex(&hash.finalize()),
         })
     }
 
-    /// The levels that no shard makes, each of the one below.
+    /// Writes the upper levels, each from the level below.
     fn upper<T: Sample>(
         &self,
         pyramid: &Pyramid,
@@ -110,7 +110,7 @@ impl SlideSet {
         Ok(())
     }
 
-    /// What a shard holds, from the shards of the level below that lie under it.
+    /// Computes a shard from the shards of the level below.
     fn halves<T: Sample>(
         &self,
         array: &Array,
@@ -139,16 +139,16 @@ impl SlideSet {
         Ok(values)
     }
 
-    /// The slide as a small PNG: the middle plane.
+    /// Encodes the central plane as a small PNG file.
     fn thumbnail(&self) -> Result<Vec<u8>, Error> {
         let plane = self.head.planes_um.len() / 2;
-        let sizes = self.forms.image.levels().iter().map(|array| array.shape());
+        let sizes = self.pyramids.image.levels().iter().map(|array| array.shape());
         let level = sizes
             .enumerate()
             .find(|(_, [_, _, rows, columns])| rows.max(columns) <= &THUMBNAIL_PX)
             .map_or(self.levels() - 1, |(level, _)| level);
         let [width, height] = self.level_px(level).unwrap_or([1; 2]);
-        let grey = self.picture(level, plane, 0..height, 0..width)?;
+        let grey = self.image(level, plane, 0..height, 0..width)?;
         let shift = self.head.bits.saturating_sub(8);
         let bytes: Vec<u16> = grey.iter().map(|grey| grey >> shift).collect();
         let pixel_um = self.head.pixel_um * f64::from(1_u32 << level);
@@ -161,7 +161,7 @@ impl SlideSet {
         let um = [head.width_px, head.height_px].map(|px| f64::from(px) * head.pixel_um / 1000.0);
         format!(
             "# A synthetic slide\n\n\
-             Made by papsynth; no part of it is of any patient.\n\n\
+             Generated by papsynth; it does not show a patient.\n\n\
              | | |\n|---|---|\n\
              | size | {} x {} px, {:.2} x {:.2} mm, {} µm a pixel |\n\
              | focal planes, µm | {:?} |\n\
@@ -169,10 +169,10 @@ impl SlideSet {
              | objects and parts of cells | {objects} |\n\
              | seed, slide | {}, {} |\n\
              | recipe | `recipe.toml`, SHA-256 {} |\n\n\
-             `slide.ome.zarr` is OME-Zarr 0.5: the picture, and as labels the front-most cytoplasm, nucleus and debris at each pixel \
-             and the number of cytoplasms there (`layers`). `objects/` has a table and a GeoJSON file for every square of {} pixels, with \
-             the complete mask of every object whose middle lies there; ids are those of the labels.\n\n\
-             The same files come again from `papsynth slide make recipe.toml --model model.json --out DIR --seed {} --slide {} --shard-px {}{}`.\n",
+             `slide.ome.zarr` is OME-Zarr 0.5: the image, and as labels the visible cytoplasm, nucleus and debris of each pixel \
+             and its number of cytoplasms (`layers`). `objects/` has a table and a GeoJSON file for every square of {} px, with \
+             the complete mask of every object whose centre is in it; ids are those of the labels.\n\n\
+             To generate the same files again, run `papsynth slide make recipe.toml --model model.json --out DIR --seed {} --slide {} --shard-px {}{}`.\n",
             head.width_px,
             head.height_px,
             um[0],
@@ -188,7 +188,7 @@ impl SlideSet {
             head.identity.seed,
             head.slide,
             head.shard_px,
-            // Only builds with Parquet know the word, and write it unless told otherwise.
+            // Builds with Parquet write the table by default.
             if HAS_PARQUET && !head.objects_parquet { " --no-parquet" } else { "" },
         )
     }
@@ -205,11 +205,11 @@ mod tests {
 
     use super::super::{SlideInfo, SlideRun};
     use super::*;
-    use crate::dataset::Share;
+    use crate::dataset::Task;
     use crate::files::fault;
 
     #[test]
-    fn wherever_the_disk_fails_no_file_is_partial_and_the_next_run_completes_the_slide() {
+    fn after_any_disk_failure_no_file_is_partial_and_the_next_run_completes_the_slide() {
         let mut recipe = Preset::Sparse.recipe();
         (recipe.scan.width_px, recipe.scan.height_px, recipe.scan.frame_px) = (600, 64, 256);
         recipe.cells.clear();
@@ -226,8 +226,8 @@ mod tests {
         let make = |path: &Path| {
             let set = SlideSet::create_or_resume(path, &slide, &info)?;
             let stop = AtomicBool::new(false);
-            let run = SlideRun { share: Share::ALL, threads: Threads::One, check: Check::Sizes, stop: &stop };
-            set.make(&slide, &run, &|_| ())?;
+            let run = SlideRun { task: Task::ALL, threads: Threads::One, check: Check::Sizes, stop: &stop };
+            set.generate(&slide, &run, &|_| ())?;
             set.finish(Check::Sizes)
         };
         let failures = fault::everywhere("slide-faults", 60, "", make);

@@ -1,4 +1,4 @@
-//! Any part of any level of a slide, read back.
+//! Reading of regions of a slide.
 
 use std::fs::File;
 use std::ops::Range;
@@ -11,7 +11,7 @@ use super::set::{SlideSet, UPPER, place};
 use crate::error::Error;
 
 impl SlideSet {
-    /// Rows and columns of an array that lie in one shard.
+    /// Reads rows and columns of an array inside one shard.
     pub(super) fn region<T: Sample>(
         &self,
         array: &Array,
@@ -29,11 +29,11 @@ impl SlideSet {
         reader.region(channel, plane, rows, columns).map_err(bad)
     }
 
-    /// Pixels of a part of a level of the image, channels side by side: `rows` and `columns` of a plane.
+    /// Reads `rows` and `columns` of a plane of a level of the image, channels interleaved.
     ///
     /// # Errors
-    /// If they leave the level, or its files are missing or damaged.
-    pub fn picture(
+    /// If they are outside the level, or its files are missing or damaged.
+    pub fn image(
         &self,
         level: usize,
         plane: usize,
@@ -41,7 +41,7 @@ impl SlideSet {
         columns: Range<usize>,
     ) -> Result<Vec<u16>, Error> {
         let channels = self.head.channels;
-        let array = self.level(&self.forms.image, level)?;
+        let array = self.level(&self.pyramids.image, level)?;
         let mut values = vec![0; rows.len() * columns.len() * channels];
         for channel in 0..channels {
             let layer: Vec<u16> = if self.head.bits <= 8 {
@@ -55,10 +55,10 @@ impl SlideSet {
         Ok(values)
     }
 
-    /// Ids of the front-most objects of a group in a part of a level.
+    /// Reads the ids of the visible objects of a group in a region of a level.
     ///
     /// # Errors
-    /// As [`picture`](Self::picture).
+    /// As [`image`](Self::image).
     pub fn labels(
         &self,
         group: Group,
@@ -66,36 +66,36 @@ impl SlideSet {
         rows: Range<usize>,
         columns: Range<usize>,
     ) -> Result<Vec<u32>, Error> {
-        let array = self.level(&self.forms.labels, level)?;
+        let array = self.level(&self.pyramids.labels, level)?;
         self.gather(array, &folder(Some(group.name()), level), [0, 0], &rows, &columns)
     }
 
-    /// Levels of the image, the full one included.
+    /// Number of levels of the image, including the full resolution.
     #[must_use]
     pub fn levels(&self) -> usize {
-        self.forms.image.levels().len()
+        self.pyramids.image.levels().len()
     }
 
-    /// Levels that have been made: all of a slide that was closed, else those that are made with the shards.
+    /// Number of levels on the disk: all levels of a finished slide, otherwise those written with the shards.
     #[must_use]
-    pub fn levels_there(&self) -> usize {
-        let image = &self.forms.image;
+    pub fn written_levels(&self) -> usize {
+        let image = &self.pyramids.image;
         if self.folder.path(UPPER).is_file() { image.levels().len() } else { image.with_shard() }
     }
 
-    /// Columns and rows of a level; nothing if there is none.
+    /// Columns and rows of a level, or `None` if it does not exist.
     #[must_use]
     pub fn level_px(&self, level: usize) -> Option<[usize; 2]> {
-        let array = self.forms.image.levels().get(level)?;
+        let array = self.pyramids.image.levels().get(level)?;
         let [_, _, rows, columns] = array.shape();
         Some([columns, rows])
     }
 
     fn level<'a>(&self, pyramid: &'a Pyramid, level: usize) -> Result<&'a Array, Error> {
         let levels = pyramid.levels();
-        levels.get(level).ok_or_else(|| {
-            Error::folder(self.path(), format!("has {} levels, and none of number {level}", levels.len()))
-        })
+        levels
+            .get(level)
+            .ok_or_else(|| Error::folder(self.path(), format!("level {level}: expected 0 to {}", levels.len() - 1)))
     }
 
     fn gather<T: Sample>(
@@ -110,7 +110,7 @@ impl SlideSet {
         if rows.is_empty() || columns.is_empty() || rows.end > height || columns.end > width {
             return Err(Error::folder(
                 self.path(),
-                format!("rows {rows:?} and columns {columns:?} leave a level of {width} x {height} pixels"),
+                format!("rows {rows:?}, columns {columns:?}: outside the level of {width} x {height} px"),
             ));
         }
         let mut values = vec![T::default(); rows.len() * columns.len()];
@@ -125,7 +125,7 @@ impl SlideSet {
     }
 }
 
-/// The shards of so many pixels a side in which these rows and columns lie, as column and row, and which of them lie in each.
+/// Splits rows and columns by shards of `side` pixels. Returns column and row of each shard with its rows and columns.
 pub(super) fn parts(
     side: usize,
     rows: &Range<usize>,

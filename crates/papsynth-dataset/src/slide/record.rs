@@ -1,4 +1,4 @@
-//! What a slide is, what of it is whole, and how it is an OME-Zarr image.
+//! The head of a slide, the records of its files, and its OME-Zarr metadata.
 
 use papsynth::Slide;
 use papsynth::model::Model;
@@ -9,12 +9,12 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, json};
 
 use crate::bytes::{self, json_lines, sha256};
-use crate::dataset::{Identity, SLIDE, WRITER, lies_inside};
+use crate::dataset::{Identity, SLIDE, WRITER, is_inside};
 use crate::error::{Error, Problem};
 use crate::files::{FileRecord, Folder};
 use crate::formats::channels;
 
-/// Name of the file that says what a slide is made from.
+/// Name of the head of a slide.
 pub(super) const HEAD: &str = SLIDE[0];
 
 const FORMAT: &str = SLIDE[1];
@@ -22,52 +22,52 @@ const VERSION: u32 = 1;
 
 pub(super) const RECORD_BYTES: u64 = 1 << 26;
 
-/// What a slide is made from.
+/// The inputs of a slide.
 #[derive(Debug, Clone, Copy)]
 pub struct SlideInfo<'a> {
-    /// The recipe, resolved: as the engine got it.
+    /// The resolved recipe: the one of the engine.
     pub recipe: &'a Recipe,
     /// The model.
     pub model: &'a Model,
     /// The seed.
     pub seed: u64,
-    /// Side of the squares that are written and made again together, px: 512 times a power of two.
+    /// Size of the square shards, px: 512 times a power of two.
     pub shard_px: u32,
-    /// Whether tables of objects are also written as Parquet, which wants the feature `parquet`.
+    /// Whether tables of objects are also written as Parquet; needs the feature `parquet`.
     pub objects_parquet: bool,
 }
 
-/// What a slide is made from, and how it is cut: `slide.json`.
+/// The head of a slide: the content of `slide.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SlideHead {
-    /// What this file is.
+    /// Name of the format: `papsynth-slide`.
     pub format: String,
-    /// Version of the layout.
+    /// Version of the format.
     pub version: u32,
-    /// What wrote the files.
+    /// Program and version that wrote the files.
     pub writer: String,
-    /// What the slide is made from.
+    /// Identity: seed, versions and hashes of the inputs.
     pub identity: Identity,
-    /// Its number among the slides of its seed.
+    /// Number of the slide for its seed.
     pub slide: u64,
     /// Columns.
     pub width_px: u32,
     /// Rows.
     pub height_px: u32,
-    /// Side of a pixel, µm.
+    /// Size of a pixel, µm.
     pub pixel_um: f64,
-    /// Travel of the stage to the focal planes, µm.
+    /// Stage positions of the focal planes, µm.
     pub planes_um: Vec<f64>,
     /// Channels of a pixel: 1, or 3 for red, green and blue.
     pub channels: usize,
     /// Bits of a grey level.
     pub bits: u32,
-    /// Side of the camera's frames, px.
+    /// Size of the frames of the camera, px.
     pub frame_px: u32,
-    /// Side of a shard, px.
+    /// Size of a shard, px.
     pub shard_px: u32,
-    /// Whether tables of objects are also written as Parquet; wants the feature `parquet`.
+    /// Whether tables of objects are also written as Parquet; needs the feature `parquet`.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub objects_parquet: bool,
 }
@@ -102,25 +102,28 @@ impl SlideHead {
     /// Parses `slide.json`.
     ///
     /// # Errors
-    /// If it is none, or of another version.
+    /// If it is invalid or of another version.
     pub fn from_json(bytes: &[u8]) -> Result<Self, Problem> {
         let head: Self = serde_json::from_slice(bytes)?;
-        let said = |message: String| Err(Problem::broken("JSON", message));
+        let invalid = |message: String| Err(Problem::broken("JSON", message));
         if head.format != FORMAT || head.version != VERSION {
             let (format, version) = (head.format.escape_default().to_string(), head.version);
-            return said(format!("is `{format}` of version {version}; expected `{FORMAT}` of version {VERSION}"));
+            return invalid(format!("format `{format}`, version {version}; expected `{FORMAT}`, version {VERSION}"));
         }
-        // What is asked for by sizes is memory.
+        // Sizes decide how much memory readers allocate.
         let sides = [head.width_px, head.height_px, head.shard_px];
         if sides.iter().any(|side| !(1..=1 << 20).contains(side)) {
-            return said(format!("sides of {sides:?} pixels; expected 1 to 1048576"));
+            return invalid(format!("sizes {sides:?} px; expected 1 to 1048576"));
         }
         if !(1..=1024).contains(&head.planes_um.len())
             || !matches!(head.channels, 1 | 3)
             || !(1..=16).contains(&head.bits)
         {
             let planes = head.planes_um.len();
-            return said(format!("{planes} planes of {} channels of {} bits", head.channels, head.bits));
+            return invalid(format!(
+                "planes {planes}, channels {}, bits {}; expected 1 to 1024 planes, 1 or 3 channels, 1 to 16 bits",
+                head.channels, head.bits
+            ));
         }
         Ok(head)
     }
@@ -131,11 +134,12 @@ impl SlideHead {
         text
     }
 
-    /// The SHA-256 of `slide.json`.
+    /// Returns the SHA-256 of `slide.json`.
     pub(super) fn sha256(&self) -> String {
         sha256(&self.to_json())
     }
 
+    /// Returns the first property in which two heads differ.
     pub(super) fn differs(&self, other: &Self) -> Option<&'static str> {
         let (a, b) = (&self.identity, &other.identity);
         let pairs = [
@@ -152,17 +156,17 @@ impl SlideHead {
     }
 }
 
-/// Says that files of a slide are whole: written after all of them.
+/// The record of files of a slide, written after all of them.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SlideRecord {
-    /// SHA-256 of the slide's `slide.json`.
+    /// SHA-256 of `slide.json`.
     pub head_sha256: String,
-    /// Objects and parts of cells that are told in the files.
+    /// Number of objects and parts of cells in the files.
     pub objects: u64,
-    /// The files, by path.
+    /// The files, sorted by path.
     pub files: Vec<FileRecord>,
-    /// SHA-256 of the record as compact JSON in which this is empty.
+    /// SHA-256 of the record as compact JSON in which this field is empty.
     pub sha256: String,
 }
 
@@ -184,18 +188,18 @@ impl SlideRecord {
     /// Parses a record.
     ///
     /// # Errors
-    /// If it is none, was changed after it was written, or names a file outside the slide.
+    /// If it is invalid, was changed after it was written, or lists a file outside the slide.
     pub fn from_json(bytes: &[u8]) -> Result<Self, Problem> {
         let record: Self = serde_json::from_slice(bytes)?;
-        let said = |message: &str| Err(Problem::broken("JSON", message));
-        if !record.files.iter().all(|file| lies_inside(&file.path)) {
-            return said("names a file outside the slide");
+        let invalid = |message: &str| Err(Problem::broken("JSON", message));
+        if !record.files.iter().all(|file| is_inside(&file.path)) {
+            return invalid("lists a file outside the slide");
         }
         if record.clone().sealed().sha256 != record.sha256 {
-            return said("is not as it was written: its own SHA-256 is another");
+            return invalid("was changed: its SHA-256 differs");
         }
         if record.to_json() != bytes {
-            return said("is not as it was written: it says the same in other bytes");
+            return invalid("was reformatted: the content is equal, but not the bytes");
         }
         Ok(record)
     }
@@ -205,17 +209,18 @@ const CHUNK: usize = 512;
 
 pub(super) const IMAGE: &str = "slide.ome.zarr";
 
-/// Name of the label image that counts cytoplasms.
+/// Name of the label image with the number of cytoplasms.
 pub(super) const LAYERS: &str = "layers";
 
+/// The pyramids of image and labels.
 #[derive(Debug)]
-pub(super) struct Forms {
+pub(super) struct Pyramids {
     pub(super) image: Pyramid,
     pub(super) labels: Pyramid,
     pub(super) layers: Pyramid,
 }
 
-impl Forms {
+impl Pyramids {
     pub(super) fn new(head: &SlideHead) -> Result<Self, papsynth_zarr::Error> {
         let (width, height) = (head.width_px as usize, head.height_px as usize);
         let form = |kind, channels, planes| {
@@ -240,7 +245,7 @@ impl Forms {
         })
     }
 
-    /// The documents of the image, by their paths in the slide's folder.
+    /// Returns the metadata documents of the image with their paths in the folder.
     pub(super) fn documents(&self, head: &SlideHead) -> Result<Vec<(String, Vec<u8>)>, papsynth_zarr::Error> {
         let labels = |name: &str, pyramid: &Pyramid| Labels {
             name: name.to_owned(),
@@ -274,7 +279,7 @@ impl Forms {
     }
 }
 
-/// The folder of a level of the image, or of the labels of a name.
+/// Returns the folder of a level of the image, or of labels.
 pub(super) fn folder(labels: Option<&str>, level: usize) -> String {
     match labels {
         None => format!("{IMAGE}/{level}"),

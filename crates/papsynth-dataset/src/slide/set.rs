@@ -1,4 +1,4 @@
-//! The folder of a slide: begun, resumed, looked at.
+//! The folder of a slide: creation, resumption, inspection.
 
 use std::fs;
 use std::path::Path;
@@ -6,55 +6,55 @@ use std::path::Path;
 use papsynth::Slide;
 use papsynth_zarr::Shard;
 
-use super::record::{Forms, HEAD, IMAGE, RECORD_BYTES, SlideHead, SlideInfo, SlideRecord};
-use crate::dataset::{Identity, recipe_difference, refuse_nested, stranger};
+use super::record::{HEAD, IMAGE, Pyramids, RECORD_BYTES, SlideHead, SlideInfo, SlideRecord};
+use crate::dataset::{Identity, any_content, recipe_difference, refuse_nested};
 use crate::error::Error;
 use crate::files::{Check, FileRecord, Folder};
 use crate::formats::{HAS_PARQUET, names};
 
-/// Name of the record of what was added at the end.
+/// Name of the record of the files that [`SlideSet::finish`] adds.
 pub(super) const UPPER: &str = "upper.json";
 
 pub(super) const THUMBNAIL: &str = "thumbnail.png";
 pub(super) const CARD: &str = "README.md";
 
-/// A slide in a folder. Shards may be written in any order, by several processes; nothing outside the folder is touched.
+/// A slide in a folder. Several processes may write shards in any order. No file outside the folder is changed.
 #[derive(Debug)]
 pub struct SlideSet {
     pub(super) folder: Folder,
     pub(super) head: SlideHead,
-    pub(super) forms: Forms,
+    pub(super) pyramids: Pyramids,
 }
 
 impl SlideSet {
-    /// Begins a slide in a folder that is empty or not there yet, or goes on with the one in it. Where `slide.json` is lost or damaged, the
-    /// records of shards tell whether it is this one.
+    /// Creates a slide in a new or empty folder, or resumes the one in the folder. If `slide.json` is missing or
+    /// damaged, the records of shards identify the slide.
     ///
     /// # Errors
-    /// If the folder holds something else, or a slide of another recipe, model, seed, number, stream version or shard size, objects in the
-    /// middle of the deposit reach farther than `scan.reach_um`, or the system refuses.
+    /// If the folder contains other files or a slide with another recipe, model, seed, number, stream version or shard
+    /// size, objects at the centre of the deposit are larger than `scan.max_object_radius_um`, or a file cannot be read
+    /// or written.
     pub fn create_or_resume(path: &Path, slide: &Slide, info: &SlideInfo) -> Result<Self, Error> {
         let (identity, recipe, model) = Identity::of(info.recipe, info.model, info.seed);
         let head = SlideHead::new(identity, slide, info);
         if info.objects_parquet && !HAS_PARQUET {
             return Err(Error::missing_feature("the table of objects as Parquet", "parquet", path));
         }
-        let forms = Forms::new(&head).map_err(|error| Error::folder(path, error.to_string()))?;
-        let set = Self { folder: Folder::new(path), head, forms };
+        let pyramids = Pyramids::new(&head).map_err(|error| Error::folder(path, error.to_string()))?;
+        let set = Self { folder: Folder::new(path), head, pyramids };
         let text = set.head.to_json();
-        match stranger(&set.folder)? {
-            // Of several that begin at once one is the first.
+        match any_content(&set.folder)? {
+            // If several processes start at once, one of them writes the head.
             None => {
                 refuse_nested(&set.folder)?;
-                look_at_the_middle(slide)?;
-                if !set.folder.write_unless_there(HEAD, |out| out.bytes(&text))? {
+                check_centre(slide)?;
+                if !set.folder.write_new(HEAD, |out| out.bytes(&text))? {
                     set.compare_or_restore(&recipe)?;
                 }
             }
             Some(_) if Self::is_in(path) => set.compare_or_restore(&recipe)?,
             Some(name) => {
-                let message =
-                    format!("the folder holds something else (`{name}`) and no slide; choose another, or a new one");
+                let message = format!("the folder contains `{name}` and no slide; choose a new or empty folder");
                 return Err(Error::folder(path, message));
             }
         }
@@ -68,14 +68,14 @@ impl SlideSet {
         Ok(set)
     }
 
-    /// The slide in the folder must be this one.
+    /// Checks that the folder contains this slide.
     fn compare_or_restore(&self, recipe: &str) -> Result<(), Error> {
         let found = match SlideHead::read(&self.folder) {
             Err(Error::Input { .. }) if self.is_recorded()? => return Ok(()),
             Err(Error::Input { problem, .. }) if !self.folder.names_in(names::SHARDS)?.is_empty() => {
                 let message = format!(
-                    "its {HEAD} is lost or damaged ({problem}), and its shards are of another recipe, model, seed, size or number; give what it was \
-                     begun with"
+                    "{HEAD} is missing or damaged ({problem}), and the shards have another recipe, model, seed, size or number; \
+                     use the original ones"
                 );
                 return Err(Error::folder(self.path(), message));
             }
@@ -83,13 +83,17 @@ impl SlideSet {
         };
         let Some(what) = found.differs(&self.head) else { return Ok(()) };
         let same_recipe = found.identity.recipe_sha256 == self.head.identity.recipe_sha256;
-        let field = if same_recipe { String::new() } else { recipe_difference(&self.folder, recipe) };
+        let field = if same_recipe {
+            String::new()
+        } else {
+            recipe_difference(&self.folder, &found.identity.recipe_sha256, recipe)
+        };
         let message =
-            format!("holds a slide of another {what}{field}; choose another folder, or give what it was begun with");
+            format!("contains a slide with another {what}{field}; choose another folder, or use the original {what}");
         Err(Error::folder(self.path(), message))
     }
 
-    /// Whether something in the folder is recorded as part of this slide.
+    /// Whether a record in the folder belongs to this slide.
     fn is_recorded(&self) -> Result<bool, Error> {
         let shards = self.folder.names_in(names::SHARDS)?.into_iter().map(|name| format!("{}/{name}", names::SHARDS));
         for name in shards.chain([UPPER.to_owned()]) {
@@ -100,60 +104,61 @@ impl SlideSet {
         Ok(false)
     }
 
-    /// The slide that lies in a folder.
+    /// Opens the slide in a folder.
     ///
     /// # Errors
-    /// If there is none, or the system refuses to read.
+    /// If there is none, or `slide.json` cannot be read.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let folder = Folder::new(path);
         let head = SlideHead::read(&folder)?;
-        let forms = Forms::new(&head).map_err(|error| Error::folder(&folder.path(HEAD), error.to_string()))?;
-        Ok(Self { folder, head, forms })
+        let pyramids = Pyramids::new(&head).map_err(|error| Error::folder(&folder.path(HEAD), error.to_string()))?;
+        Ok(Self { folder, head, pyramids })
     }
 
-    /// Whether a folder holds a slide, be it one that lost its `slide.json`.
+    /// Whether a folder contains a slide, even without `slide.json`.
     #[must_use]
     pub fn is_in(path: &Path) -> bool {
         [HEAD, UPPER, IMAGE].iter().any(|name| path.join(name).exists())
     }
 
-    /// Whether [`finish`](Self::finish) has closed it, and what that wrote is still there.
+    /// Whether [`finish`](Self::finish) has completed the slide, and its files still exist.
     ///
     /// # Errors
-    /// If the system refuses to tell.
+    /// If a file cannot be read.
     pub fn is_finished(&self) -> Result<bool, Error> {
         Ok(self.recorded(UPPER, Check::Sizes)?.is_some())
     }
 
-    /// Where it lies.
+    /// The folder.
     #[must_use]
     pub fn path(&self) -> &Path {
         self.folder.root()
     }
 
-    /// What it is made from.
+    /// The head.
     #[must_use]
     pub fn head(&self) -> &SlideHead {
         &self.head
     }
 
-    /// Columns and rows of shards.
+    /// Number of columns and rows of shards.
     #[must_use]
-    pub fn shards(&self) -> [u32; 2] {
+    pub fn shard_grid(&self) -> [u32; 2] {
         [self.head.width_px, self.head.height_px].map(|side| side.div_ceil(self.head.shard_px))
     }
 
-    /// Every shard, as its column and row, row by row.
-    pub fn all(&self) -> impl Iterator<Item = [u32; 2]> + use<> {
-        let [columns, rows] = self.shards();
+    /// Column and row of every shard, row by row.
+    pub fn all_shards(&self) -> impl Iterator<Item = [u32; 2]> + use<> {
+        let [columns, rows] = self.shard_grid();
         (0..rows).flat_map(move |row| (0..columns).map(move |column| [column, row]))
     }
 
-    /// The record of a shard if it is whole: its record is there, is of this slide, and all its files are as it says.
+    /// Returns the record of a shard if the shard is complete: the record belongs to this slide, and all its files
+    /// match it.
     ///
     /// # Errors
-    /// If the system refuses to tell.
-    pub fn whole(&self, at: [u32; 2], check: Check) -> Result<Option<SlideRecord>, Error> {
+    /// If a file cannot be read.
+    pub fn complete_record(&self, at: [u32; 2], check: Check) -> Result<Option<SlideRecord>, Error> {
         self.recorded(&record_name(at), check)
     }
 
@@ -162,7 +167,7 @@ impl SlideSet {
         Ok(self.folder.first_flaw(&record.files, check)?.is_none().then_some(record))
     }
 
-    /// A record, if it is there and of this slide.
+    /// Returns a record if it exists and belongs to this slide.
     pub(super) fn record(&self, name: &str) -> Result<Option<SlideRecord>, Error> {
         let path = self.folder.path(name);
         let bytes = match fs::metadata(&path) {
@@ -174,19 +179,19 @@ impl SlideSet {
         Ok(record.filter(|record| record.head_sha256 == self.head.sha256()))
     }
 
-    /// The documents of the image, by their paths in the slide's folder.
+    /// Returns the metadata documents of the image with their paths in the folder.
     pub(super) fn documents(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
-        self.forms.documents(&self.head).map_err(|error| Error::folder(self.path(), error.to_string()))
+        self.pyramids.documents(&self.head).map_err(|error| Error::folder(self.path(), error.to_string()))
     }
 
-    /// Shards that are not whole.
+    /// Returns the shards that are not complete.
     ///
     /// # Errors
-    /// If the system refuses to tell.
+    /// If a file cannot be read.
     pub fn missing(&self, check: Check) -> Result<Vec<[u32; 2]>, Error> {
         let mut missing = Vec::new();
-        for at in self.all() {
-            if self.whole(at, check)?.is_none() {
+        for at in self.all_shards() {
+            if self.complete_record(at, check)?.is_none() {
                 missing.push(at);
             }
         }
@@ -201,10 +206,11 @@ impl SlideSet {
     }
 }
 
-/// Looks through the middle of the deposit, or where the slide is nearest to it: what a recipe asks too much of shows there first.
-fn look_at_the_middle(slide: &Slide) -> Result<(), Error> {
+/// Checks the objects at the centre of the deposit, or at the nearest point of the slide: the largest objects are
+/// there.
+fn check_centre(slide: &Slide) -> Result<(), Error> {
     let (side, size, deposit_um) = (slide.side_px(), slide.size_px(), slide.deposit_um());
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place on the slide")]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a position on the slide")]
     let origin = [0, 1].map(|axis| {
         let last = size[axis].saturating_sub(side);
         (deposit_um[axis] / slide.pixel_um()).clamp(0.0, f64::from(last)) as u32
@@ -217,12 +223,12 @@ pub(super) fn record_name([column, row]: [u32; 2]) -> String {
     format!("{}/{}.json", names::SHARDS, name_of([column, row]))
 }
 
-/// The name of a shard: its row and its column.
+/// Returns the name of a shard: row and column.
 pub(super) fn name_of([column, row]: [u32; 2]) -> String {
     format!("{row:04}-{column:04}")
 }
 
-/// The place of a shard in an array, in a plane.
+/// Returns the position of a shard in an array.
 pub(super) fn place([column, row]: [u32; 2], plane: usize) -> Shard {
     Shard { z: plane, y: row as usize, x: column as usize }
 }

@@ -1,4 +1,4 @@
-//! A shard of a slide: its square of every array that lies over it, and its objects.
+//! Generation of shards of a slide: the pixels of every array, and the objects.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -10,58 +10,63 @@ use serde_json::{Value, json};
 use super::record::{LAYERS, folder};
 use super::set::{SlideSet, name_of, place, record_name};
 use crate::bytes;
-use crate::dataset::Share;
+use crate::dataset::Task;
 use crate::error::Error;
 use crate::files::{Check, FileRecord, Output};
 use crate::formats::parquet::Table;
 use crate::truth::{Row, collection, slide_columns, slide_table};
 
-/// Which shards to make, and how.
+/// Options of [`SlideSet::generate`].
 #[derive(Debug, Clone, Copy)]
 pub struct SlideRun<'a> {
-    /// Which of the shards: all, or every so many.
-    pub share: Share,
-    /// How many threads work on a shard. The bytes are the same.
+    /// The part of the shards to generate.
+    pub task: Task,
+    /// Number of threads for one shard. It does not change the output.
     pub threads: Threads,
-    /// How carefully shards that are there are looked at, before they are kept.
+    /// The check of shards that are already present.
     pub check: Check,
-    /// Set to end early: the shard that is being made is given up.
+    /// Set it to stop early, after the shard in work.
     pub stop: &'a AtomicBool,
 }
 
-/// A shard is done.
+/// Progress of a run: one shard is done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SlideProgress {
-    /// Its column and row.
-    pub at: [u32; 2],
-    /// How many are done, and how many there are to do.
-    pub done: [u64; 2],
-    /// Whether it was whole before.
-    pub kept: bool,
-    /// Objects and parts of cells told in it.
+    /// Column and row of the shard.
+    pub shard: [u32; 2],
+    /// Number of shards that are done.
+    pub done: u64,
+    /// Number of shards of the task.
+    pub total: u64,
+    /// Whether the shard was already present.
+    pub present: bool,
+    /// Number of objects and parts of cells in it.
     pub objects: u64,
 }
 
 impl SlideSet {
-    /// Makes the shards that are not whole, and reports each. Gives whether it was stopped before its end.
+    /// Generates the incomplete shards and calls `report` after each shard. Returns whether the run was stopped early.
     ///
     /// # Errors
-    /// The first failure of the engine or the system.
-    pub fn make(&self, slide: &Slide, run: &SlideRun, report: &dyn Fn(SlideProgress)) -> Result<bool, Error> {
-        let of = run.share.of.max(1);
-        let shards: Vec<[u32; 2]> =
-            (0_u64..).zip(self.all()).filter(|(number, _)| number % of == run.share.index).map(|(_, at)| at).collect();
+    /// If the engine fails, or a file cannot be read or written.
+    pub fn generate(&self, slide: &Slide, run: &SlideRun, report: &dyn Fn(SlideProgress)) -> Result<bool, Error> {
+        let total = run.task.total.max(1);
+        let shards: Vec<[u32; 2]> = (0_u64..)
+            .zip(self.all_shards())
+            .filter(|(number, _)| number % total == run.task.index)
+            .map(|(_, at)| at)
+            .collect();
         for (number, &at) in (1_u64..).zip(&shards) {
             if run.stop.load(Ordering::Relaxed) {
                 return Ok(true);
             }
-            let before = self.whole(at, run.check)?;
-            let kept = before.is_some();
-            let objects = match before {
+            let record = self.complete_record(at, run.check)?;
+            let present = record.is_some();
+            let objects = match record {
                 Some(record) => record.objects,
                 None => self.write_shard(slide, at, run.threads)?,
             };
-            report(SlideProgress { at, done: [number, shards.len() as u64], kept, objects });
+            report(SlideProgress { shard: at, done: number, total: shards.len() as u64, present, objects });
         }
         Ok(false)
     }
@@ -82,16 +87,16 @@ impl SlideSet {
             if self.head.bits <= 8 {
                 #[expect(clippy::cast_possible_truncation, reason = "grey levels of 8 bits")]
                 let layers = layers.iter().map(|layer| layer.iter().map(|grey| *grey as u8).collect()).collect();
-                files.extend(self.write_levels::<u8>(&self.forms.image, None, at, plane, layers, width, halved)?);
+                files.extend(self.write_levels::<u8>(&self.pyramids.image, None, at, plane, layers, width, halved)?);
             } else {
-                files.extend(self.write_levels(&self.forms.image, None, at, plane, layers, width, halved)?);
+                files.extend(self.write_levels(&self.pyramids.image, None, at, plane, layers, width, halved)?);
             }
         }
         for (group, labels) in Group::ALL.into_iter().zip(part.labels) {
-            let (pyramid, name) = (&self.forms.labels, Some(group.name()));
+            let (pyramid, name) = (&self.pyramids.labels, Some(group.name()));
             files.extend(self.write_levels(pyramid, name, at, 0, vec![labels.ids], width, halved_labels)?);
         }
-        let (pyramid, name) = (&self.forms.layers, Some(LAYERS));
+        let (pyramid, name) = (&self.pyramids.layers, Some(LAYERS));
         files.extend(self.write_levels(pyramid, name, at, 0, vec![part.layers], width, halved_labels)?);
         let name = name_of(at);
         let objects = &part.objects;
@@ -110,16 +115,16 @@ impl SlideSet {
         Ok(count)
     }
 
-    /// The outlines of a shard, in pixels of the slide.
+    /// Returns the outlines of the objects of a shard as GeoJSON, in pixels of the slide.
     fn outlines(&self, objects: &[ObjectTruth]) -> Value {
         let (seed, slide) = (self.head.identity.seed, self.head.slide);
         let name = |o: &ObjectTruth| format!("papsynth slide {seed} {slide} {} {:?}", o.id, o.part);
-        let measure = |o: &ObjectTruth, _: Option<&ObjectTruth>| json!({ "Area µm^2": o.area_um2, "Depth µm": o.depth_um, "Stain": o.stain });
+        let measure = |o: &ObjectTruth, _: Option<&ObjectTruth>| json!({ "Area µm^2": o.area_um2, "Depth µm": o.depth_um, "Mean absorbance": o.mean_absorbance });
         collection(&objects.iter().collect::<Vec<_>>(), name, measure)
     }
 
-    /// Writes the shards of all levels that follow from this one alone, each level half of that before.
-    #[expect(clippy::too_many_arguments, reason = "one place, one array, one way to halve")]
+    /// Writes a shard in all levels that are computed from it alone, each half the size of the previous level.
+    #[expect(clippy::too_many_arguments, reason = "position, array and halving function")]
     fn write_levels<T: Sample>(
         &self,
         pyramid: &Pyramid,

@@ -1,61 +1,71 @@
-//! Whether a slide is as it was written.
+//! Verification of a slide.
 
 use std::collections::BTreeSet;
 
 use papsynth::truth::Group;
 use papsynth_zarr::Shard;
 
-use super::record::{Forms, HEAD, LAYERS, folder};
+use super::record::{HEAD, LAYERS, Pyramids, folder};
 use super::set::{CARD, SlideSet, THUMBNAIL, UPPER, name_of, place, record_name};
-use crate::dataset::Finding;
+use crate::dataset::{Finding, VerifyProgress};
 use crate::error::Error;
 use crate::files::{Check, FileRecord};
 use crate::formats::names;
 
 impl SlideSet {
-    /// Reads every file and says what is missing, cut, changed or too many, by path.
+    /// Verifies a slide: reads every file, and returns missing, truncated, changed and untracked files, sorted by path.
+    /// Files of the desktop, such as `.DS_Store`, are ignored.
     ///
     /// # Errors
-    /// If the system refuses to read.
+    /// If a file cannot be read.
     pub fn verify(&self) -> Result<Vec<Finding>, Error> {
+        self.verify_with_progress(&|_| ())
+    }
+
+    /// As [`verify`](Self::verify); calls `report` after each file.
+    ///
+    /// # Errors
+    /// As [`verify`](Self::verify).
+    pub fn verify_with_progress(&self, report: &dyn Fn(VerifyProgress)) -> Result<Vec<Finding>, Error> {
         let mut findings = Vec::new();
         let (files, unrecorded) = self.listed()?;
         for name in &unrecorded {
             let there = self.folder.path(name).exists();
-            let message = if there { "is no record of this slide, or was changed" } else { "is missing" };
-            findings.push(Finding::made_wrong(name, message));
+            let message = if there { "changed, or the record of another slide" } else { "missing" };
+            findings.push(Finding::damaged(name, message));
         }
-        for file in &files {
+        for (done, file) in (1..).zip(&files) {
             let flaw = self.folder.flaw(file, Check::Hashes)?;
-            findings.extend(flaw.map(|message| Finding::made_wrong(&file.path, message)));
+            findings.extend(flaw.map(|message| Finding::damaged(&file.path, message)));
+            report(VerifyProgress { done, total: files.len() as u64 });
         }
         let mut known = self.names_of(&files);
-        // What a lost record vouched for is no stray.
-        known.extend(unrecorded.iter().flat_map(|name| self.vouched_for(name)));
+        // Files of a lost record are not untracked.
+        known.extend(unrecorded.iter().flat_map(|name| self.files_of_record(name)));
         let there = self.folder.names()?;
-        findings.extend(there.iter().filter(|path| !known.contains(*path)).map(|path| Finding::stray(path, "slide")));
+        findings
+            .extend(there.iter().filter(|path| !known.contains(*path)).map(|path| Finding::untracked(path, "slide")));
         findings.sort();
         Ok(findings)
     }
 
-    /// The names of all files that a slide has which is closed.
+    /// Returns the names of all files of a finished slide.
     ///
     /// # Errors
-    /// If it is not closed, so that others may be at work, a record cannot be read, or the system refuses.
+    /// If the slide is not finished, or a record cannot be read.
     pub(crate) fn own_names(&self) -> Result<BTreeSet<String>, Error> {
         let (files, unrecorded) = self.listed()?;
         match unrecorded.first() {
             None => Ok(self.names_of(&files)),
             Some(name) => {
-                let message = format!(
-                    "what others are writing cannot be told from strays before `papsynth slide finalize` has closed the slide ({name} is missing)"
-                );
+                let message =
+                    format!("untracked files can be removed only after `papsynth slide finalize` (missing: {name})");
                 Err(Error::folder(self.path(), message))
             }
         }
     }
 
-    /// All files but the records, and the records that are missing or are none of this slide.
+    /// Returns all files except records, and the names of missing or invalid records.
     fn listed(&self) -> Result<(Vec<FileRecord>, Vec<String>), Error> {
         let (mut files, mut unrecorded) = (self.given()?, Vec::new());
         for name in self.record_names() {
@@ -67,16 +77,16 @@ impl SlideSet {
         Ok((files, unrecorded))
     }
 
-    /// The names of the files that a record must name.
-    fn vouched_for(&self, record: &str) -> Vec<String> {
-        let at = self.all().find(|&at| record_name(at) == record);
+    /// Returns the names of the files that a record must list.
+    fn files_of_record(&self, record: &str) -> Vec<String> {
+        let at = self.all_shards().find(|&at| record_name(at) == record);
         let mut names = match at {
             Some(at) => {
                 ["csv", "geojson", "parquet"].map(|ending| format!("objects/{}.{ending}", name_of(at))).to_vec()
             }
             None => vec![CARD.to_owned(), THUMBNAIL.to_owned()],
         };
-        let Forms { image, labels, layers } = &self.forms;
+        let Pyramids { image, labels, layers } = &self.pyramids;
         let labels = Group::ALL.map(|group| (Some(group.name()), labels));
         for (labels, pyramid) in labels.into_iter().chain([(None, image), (Some(LAYERS), layers)]) {
             for (level, array) in pyramid.levels().iter().enumerate() {
@@ -94,14 +104,14 @@ impl SlideSet {
     }
 
     fn record_names(&self) -> impl Iterator<Item = String> + use<> {
-        self.all().map(record_name).chain([UPPER.to_owned()])
+        self.all_shards().map(record_name).chain([UPPER.to_owned()])
     }
 
     fn names_of(&self, files: &[FileRecord]) -> BTreeSet<String> {
         files.iter().map(|file| file.path.clone()).chain(self.record_names()).collect()
     }
 
-    /// The files that are no shard's: what they must be follows from `slide.json`.
+    /// Returns the expected records of the files that belong to no shard, from `slide.json`.
     fn given(&self) -> Result<Vec<FileRecord>, Error> {
         let mut files = vec![FileRecord::of(HEAD, &self.head.to_json())];
         files.extend(self.documents()?.iter().map(|(path, bytes)| FileRecord::of(path, bytes)));
@@ -114,9 +124,9 @@ impl SlideSet {
         Ok(files)
     }
 
-    /// The name of a shard in its files.
+    /// Returns the name of a shard in file names.
     #[must_use]
-    pub fn name_of(at: [u32; 2]) -> String {
+    pub fn shard_name(at: [u32; 2]) -> String {
         name_of(at)
     }
 }

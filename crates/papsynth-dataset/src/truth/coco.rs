@@ -1,4 +1,4 @@
-//! COCO: a document for each frame, and one for all.
+//! COCO documents of frames and data sets.
 
 use papsynth::scene::{Kind, Tint};
 use papsynth::truth::{Group, Mask, ObjectTruth, Part, Traits, Truth};
@@ -35,7 +35,7 @@ pub(crate) struct Image {
     #[serde(skip_serializing_if = "Option::is_none", default)]
     all_in_focus: Option<String>,
     pixel_um: f64,
-    /// The pixels of each plane that are saturated, if some are.
+    /// Saturated pixels of each plane, if there are any.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     saturated: Vec<Rle>,
 }
@@ -58,10 +58,10 @@ impl Image {
     }
 }
 
-/// One object or part of a cell: COCO's fields, and everything else that is known of it.
+/// An object or part of a cell: the fields of COCO, and the other ground truth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Annotation {
-    /// From 1; within the shard in its own document, over all frames in the joint one.
+    /// Number from 1 in the document: that of a shard, or the merged one of all frames.
     pub(crate) id: u64,
     pub(crate) image_id: u64,
     pub(crate) category_id: u32,
@@ -70,12 +70,12 @@ pub(crate) struct Annotation {
     iscrowd: u8,
     /// The complete (amodal) mask.
     segmentation: Rle,
-    /// The pixels where the object is the front-most of its group.
-    front: Rle,
-    front_area: u64,
-    /// The id of the object in label images and tables; nucleus and cytoplasm of a cell share it.
+    /// The visible mask: pixels in which the object is the nearest of its group to the objective.
+    visible: Rle,
+    visible_area: u64,
+    /// Id of the object in label images and tables. Nucleus and cytoplasm of a cell have the same id.
     object_id: u32,
-    /// Of a nucleus: the annotation of its cytoplasm, if that is in the image.
+    /// For a nucleus: the annotation of its cytoplasm, if the image shows it.
     pub(crate) parent_id: Option<u64>,
     part: Part,
     kind: String,
@@ -85,7 +85,7 @@ pub(crate) struct Annotation {
     cluster: u32,
     centre_um: [f64; 2],
     depth_um: f64,
-    stain: f64,
+    mean_absorbance: f64,
     tint: String,
     rotation_deg: f64,
     area_um2: f64,
@@ -106,8 +106,8 @@ impl Annotation {
             area: object.amodal.area(),
             iscrowd: 0,
             segmentation: Rle::new(&object.amodal, width, height),
-            front: Rle::new(&object.front, width, height),
-            front_area: object.front.area(),
+            visible: Rle::new(&object.visible, width, height),
+            visible_area: object.visible.area(),
             object_id: object.id,
             parent_id,
             part: object.part,
@@ -118,7 +118,7 @@ impl Annotation {
             cluster: object.cluster,
             centre_um: object.centre_um,
             depth_um: object.depth_um,
-            stain: object.stain,
+            mean_absorbance: object.mean_absorbance,
             tint: object.tint_name().to_owned(),
             rotation_deg: object.rotation_deg,
             area_um2: object.area_um2,
@@ -129,36 +129,36 @@ impl Annotation {
         }
     }
 
-    /// With `ids` more before it.
+    /// Returns the annotation with `ids` added to its ids.
     pub(crate) fn renumbered(self, ids: u64) -> Self {
         let parent_id = self.parent_id.map(|parent| parent.saturating_add(ids));
         Self { id: self.id.saturating_add(ids), parent_id, ..self }
     }
 
-    /// The complete mask and the group it belongs to.
+    /// Returns the group and the complete mask.
     pub(crate) fn amodal(&self) -> Result<(Group, Mask), Problem> {
         Ok((group(self.part), self.segmentation.mask()?))
     }
 
-    /// The truth it was written from.
+    /// Returns the ground truth of the object.
     ///
     /// # Errors
-    /// If a mask is none, or is not as box and areas say.
+    /// If a mask is invalid, or differs from its box or areas.
     pub(crate) fn object(&self) -> Result<ObjectTruth, Problem> {
-        let (amodal, front) = (self.segmentation.mask()?, self.front.mask()?);
+        let (amodal, front) = (self.segmentation.mask()?, self.visible.mask()?);
         let wrong =
-            |what: &str| Problem::broken("COCO", format!("annotation {}: {what} is not that of its mask", self.id));
+            |what: &str| Problem::broken("COCO", format!("annotation {}: {what} differs from the mask", self.id));
         let claims: [(&str, bool); 4] = [
             ("area", self.area == amodal.area()),
             ("bbox", self.bbox == box_of(&amodal)),
-            ("front_area", self.front_area == front.area()),
+            ("visible_area", self.visible_area == front.area()),
             ("centroid", self.centroid == amodal.centroid()),
         ];
         if let Some((what, _)) = claims.into_iter().find(|(_, holds)| !holds) {
             return Err(wrong(what));
         }
         let unknown = |what: &str, found: &str| {
-            Problem::broken("COCO", format!("annotation {}: there is no {what} `{}`", self.id, found.escape_default()))
+            Problem::broken("COCO", format!("annotation {}: unknown {what} `{}`", self.id, found.escape_default()))
         };
         let kind = Kind::ALL.into_iter().find(|kind| kind.name() == self.kind);
         let tint =
@@ -173,7 +173,7 @@ impl Annotation {
             cluster: self.cluster,
             centre_um: self.centre_um,
             depth_um: self.depth_um,
-            stain: self.stain,
+            stain: self.mean_absorbance,
             tint: tint.transpose()?,
             rotation_deg: self.rotation_deg,
             area_um2: self.area_um2,
@@ -186,9 +186,9 @@ impl Annotation {
     }
 }
 
-/// Whether a mask of an object leaves an image of this size.
+/// Whether a mask of an object extends beyond an image of this size.
 pub(crate) fn leaves(object: &ObjectTruth, width: usize, height: usize) -> bool {
-    let bounds = [&object.amodal, &object.front].into_iter().filter_map(Mask::bounds);
+    let bounds = [&object.amodal, &object.visible].into_iter().filter_map(Mask::bounds);
     bounds.into_iter().any(|b| (b.x + b.width) as usize > width || (b.y + b.height) as usize > height)
 }
 
@@ -213,16 +213,16 @@ pub(crate) struct Document {
     pub(crate) info: Info,
     pub(crate) licenses: Vec<String>,
     pub(crate) categories: Vec<Category>,
-    /// Before the images, which are written when all are known.
+    /// Annotations are before the images, because images are written at the end of a shard.
     pub(crate) annotations: Vec<Annotation>,
     pub(crate) images: Vec<Image>,
 }
 
 impl Document {
-    /// The document of one frame.
+    /// Returns the document of one frame.
     ///
     /// # Errors
-    /// The name of the category of an object, if it is not among these.
+    /// If the category of an object is not in `categories`; the error is its name.
     pub(crate) fn of_frame(
         truth: &Truth,
         frame: &FrameSummary,
@@ -252,22 +252,23 @@ impl Document {
         self.images.iter().find(|image| image.id == index)
     }
 
-    /// The pixels of each plane of an image that are saturated; none if none is in any.
+    /// Returns the saturated pixels of each plane of an image; empty if there are none.
     pub(crate) fn saturated(&self, index: u64) -> Result<Vec<Mask>, Problem> {
         self.image(index).map_or(&[][..], |image| &image.saturated).iter().map(Rle::mask).collect()
     }
 
-    /// The truth of a frame among those of the document.
+    /// Returns the ground truth of a frame.
     ///
     /// # Errors
-    /// If it has no such frame, or what it says of it does not fit together.
+    /// If the document does not have the frame, or is inconsistent.
     pub(crate) fn truth(&self, index: u64) -> Result<Truth, Problem> {
-        let image = self.image(index).ok_or_else(|| Problem::broken("COCO", format!("it has no image {index}")))?;
+        let image =
+            self.image(index).ok_or_else(|| Problem::broken("COCO", format!("the document has no image {index}")))?;
         let of_frame = self.annotations.iter().filter(|annotation| annotation.image_id == index);
         let objects: Vec<ObjectTruth> = of_frame.map(Annotation::object).collect::<Result<_, _>>()?;
         match objects.iter().find(|object| leaves(object, image.width, image.height)) {
             Some(object) => {
-                let message = format!("the mask of object {} of image {index} leaves the image", object.id);
+                let message = format!("image {index}: the mask of object {} extends beyond the image", object.id);
                 Err(Problem::broken("COCO", message))
             }
             None => Ok(Truth { width: image.width, height: image.height, objects }),
@@ -275,11 +276,11 @@ impl Document {
     }
 }
 
-/// The truth of every frame of a COCO document of a data set (`shards/*.coco.json`, `coco.json`), with the index of the frame, in the order of
-/// its images.
+/// Reads the ground truth of every frame of a COCO document of a data set (`shards/*.coco.json`, `coco.json`), with the index of the
+/// frame, in the order of the images.
 ///
 /// # Errors
-/// If the bytes are no such document, or boxes and areas are not those of the masks.
+/// If the document is invalid, or boxes or areas differ from the masks.
 pub fn truths(bytes: &[u8]) -> Result<Vec<(u64, Truth)>, Problem> {
     let document: Document = serde_json::from_slice(bytes)?;
     document.images.iter().map(|image| Ok((image.id, document.truth(image.id)?))).collect()

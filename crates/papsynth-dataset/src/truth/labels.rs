@@ -1,16 +1,16 @@
-//! Label images: with one label a pixel where several objects may lie, and in layers that lose nothing.
+//! Label images: with one label per pixel, and in layers with all masks complete.
 
 use papsynth::truth::{Group, Truth};
 use serde::{Deserialize, Serialize};
 
-/// What a pixel shows that belongs to several objects of a group, where a format has room for one.
+/// The label of a pixel where objects of a group overlap, in formats with one label per pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Flatten {
     /// The object nearest to the objective.
     #[default]
     Top,
-    /// None: the pixel counts as background.
+    /// Background.
     Drop,
     /// The object with the largest id.
     Max,
@@ -20,7 +20,7 @@ impl Flatten {
     /// All policies.
     pub const ALL: [Self; 3] = [Self::Top, Self::Drop, Self::Max];
 
-    /// Its name.
+    /// Returns the name.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -30,19 +30,19 @@ impl Flatten {
         }
     }
 
-    /// How many pixels of the masks of a group its labels do not show.
-    pub(crate) fn lost(self, truth: &Truth, group: Group) -> u64 {
+    /// Returns the number of pixels of the masks of a group that the labels do not show.
+    pub(crate) fn occluded(self, truth: &Truth, group: Group) -> u64 {
         let of_group = || truth.objects.iter().filter(|object| object.group() == group);
         let all: u64 = of_group().map(|object| object.amodal.area()).sum();
         let shown = match self {
-            // One object a pixel, whichever it is.
-            Self::Top | Self::Max => of_group().map(|object| object.front.area()).sum(),
+            // One object per pixel: the counts of both policies are equal.
+            Self::Top | Self::Max => of_group().map(|object| object.visible.area()).sum(),
             Self::Drop => self.labels(truth, group).iter().filter(|&&id| id > 0).count() as u64,
         };
         all - shown
     }
 
-    /// The labels of a group, row by row.
+    /// Returns the labels of a group in row-major order.
     pub(crate) fn labels(self, truth: &Truth, group: Group) -> Vec<u32> {
         let mut ids = Vec::new();
         let mut objects: Vec<_> = truth.objects.iter().filter(|object| object.group() == group).collect();
@@ -74,8 +74,8 @@ impl Flatten {
     }
 }
 
-/// The labels of a group in as few layers as a first fit in the order of ids needs, at least one; each row by row. No two objects of a layer share
-/// a pixel, so that each shows its complete mask.
+/// Returns the labels of a group in layers, at least one, each in row-major order. Objects of a layer do not overlap, so their masks are
+/// complete. Each object goes into the first layer with room for it, in the order of ids.
 pub(crate) fn layers(truth: &Truth, group: Group) -> Vec<Vec<u32>> {
     let empty = || vec![0_u32; truth.width * truth.height];
     let mut layers = vec![empty()];
@@ -97,7 +97,7 @@ mod tests {
     use super::*;
     use crate::support::{HEIGHT, WIDTH, frame};
 
-    /// Pixel by pixel from the masks.
+    /// The labels, pixel by pixel from the masks.
     fn slow(policy: Flatten, truth: &Truth, group: Group) -> Vec<u32> {
         (0..WIDTH * HEIGHT)
             .map(|pixel| {
@@ -105,7 +105,7 @@ mod tests {
                 let of_group = || truth.objects.iter().filter(|o| o.group() == group);
                 let ids: Vec<u32> = of_group().filter(|o| here(&o.amodal)).map(|o| o.id).collect();
                 match policy {
-                    Flatten::Top => of_group().find(|o| here(&o.front)).map_or(0, |o| o.id),
+                    Flatten::Top => of_group().find(|o| here(&o.visible)).map_or(0, |o| o.id),
                     Flatten::Drop if ids.len() > 1 => 0,
                     Flatten::Drop | Flatten::Max => ids.into_iter().max().unwrap_or(0),
                 }
@@ -114,20 +114,20 @@ mod tests {
     }
 
     #[test]
-    fn every_policy_is_as_pixel_by_pixel_and_counts_what_it_loses() {
+    fn policies_equal_the_slow_version_and_count_occluded_pixels() {
         let truth = frame(0, 1, 8, 1).finished.truth;
         for (policy, group) in Flatten::ALL.into_iter().flat_map(|p| Group::ALL.map(|g| (p, g))) {
-            let (ids, lost) = (policy.labels(&truth, group), policy.lost(&truth, group));
+            let (ids, occluded) = (policy.labels(&truth, group), policy.occluded(&truth, group));
             assert_eq!(ids, slow(policy, &truth, group), "{policy:?} {group:?}");
             let masks: u64 = truth.objects.iter().filter(|o| o.group() == group).map(|o| o.amodal.area()).sum();
-            assert_eq!(lost, masks - ids.iter().filter(|&&id| id > 0).count() as u64);
+            assert_eq!(occluded, masks - ids.iter().filter(|&&id| id > 0).count() as u64);
         }
-        let overlap = |policy: Flatten| policy.lost(&truth, Group::Cytoplasm);
+        let overlap = |policy: Flatten| policy.occluded(&truth, Group::Cytoplasm);
         assert!(overlap(Flatten::Top) > 50 && overlap(Flatten::Drop) == 2 * overlap(Flatten::Top));
     }
 
     #[test]
-    fn every_mask_stands_whole_in_one_layer() {
+    fn every_mask_is_complete_in_one_layer() {
         let truth = frame(0, 1, 8, 1).finished.truth;
         for (group, count) in [(Group::Cytoplasm, 2), (Group::Nucleus, 1), (Group::Debris, 1)] {
             let layers = layers(&truth, group);

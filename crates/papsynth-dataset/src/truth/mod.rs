@@ -1,4 +1,4 @@
-//! What is true of a frame, in the forms that files hold: numbers, tables, COCO, outlines, labels.
+//! Ground truth of frames in the forms of files: summaries, tables, COCO, outlines, labels.
 
 mod coco;
 mod frame;

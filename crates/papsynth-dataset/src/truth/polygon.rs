@@ -1,5 +1,5 @@
-//! Masks as polygons whose corners are corners of pixels: pixel (x, y) is the square from (x, y) to (x + 1, y + 1); and as GeoJSON, in which a
-//! cell is one feature with its nucleus within (`nucleusGeometry`) and everything else a detection.
+//! Masks as polygons along pixel edges: pixel (x, y) is the square from (x, y) to (x + 1, y + 1). Also masks as GeoJSON: a cell is one
+//! feature with its nucleus (`nucleusGeometry`), everything else is a detection.
 
 use papsynth::truth::{Mask, ObjectTruth, Part};
 use serde_json::{Value, json};
@@ -7,26 +7,26 @@ use serde_json::{Value, json};
 use super::frame::category_name;
 use crate::bytes::sha256;
 
-/// Corners of a closed line, of which the last is joined to the first; no corner is passed twice. Pixels inside lie to its right.
+/// Corners of a closed line without duplicates; the last is joined to the first. The inside is to the right.
 pub(crate) type Ring = Vec<[u32; 2]>;
 
-/// East, south, west, north: each next is a turn to the right.
+/// East, south, west, north: clockwise.
 const STEPS: [[isize; 2]; 4] = [[1, 0], [0, 1], [-1, 0], [0, -1]];
 
-/// A ring turned at this corner already: two of its pixels touch there.
+/// Marks a corner where a ring turned before: two of its pixels touch there.
 const PASSED: u8 = 1 << 4;
 
-/// The sides of pixels between mask and outside, by the corner where they begin.
-struct Sides {
-    /// Of each corner, bit `d` for a side that leaves in direction `d`, and [`PASSED`] once a ring turned there.
+/// The pixel edges on the border of a mask, by their start corner.
+struct Edges {
+    /// For each corner, bit `d` for an edge that leaves in direction `d`, and [`PASSED`] after a ring turned there.
     leaving: Vec<u8>,
-    /// Corners in a row.
+    /// Number of corners in a row.
     width: usize,
     /// The upper left corner.
     origin: [u32; 2],
 }
 
-impl Sides {
+impl Edges {
     fn of(mask: &Mask) -> Option<Self> {
         let bounds = mask.bounds()?;
         let origin = [bounds.x, bounds.y];
@@ -35,7 +35,7 @@ impl Sides {
         for run in mask.runs() {
             let row = (run.y - origin[1]) as usize * width;
             let [from, to] = [run.x0 - origin[0], run.x1 - origin[0]].map(|x| row + x as usize);
-            // What the row above left as its lower sides and this row has as its upper sides is inside.
+            // A lower edge of the row above and an upper edge of this row cancel: they are inside.
             for corner in from..to {
                 toggle(&mut leaving, [corner, corner + 1], 0);
                 toggle(&mut leaving, [corner + width + 1, corner + width], 2);
@@ -46,8 +46,8 @@ impl Sides {
         Some(Self { leaving, width, origin })
     }
 
-    /// Takes the next side from a corner: the sharpest turn to the right there is, so that pixels that touch at a corner alone are
-    /// apart.
+    /// Removes and returns the next edge at a corner: the sharpest turn to the right, so that pixels that touch only at a corner are
+    /// separate.
     fn take(&mut self, corner: usize, arrived: usize) -> Option<usize> {
         let direction = [1, 0, 3].into_iter().map(|turn| (arrived + turn) % 4);
         let direction = direction.into_iter().find(|d| self.leaving[corner] >> d & 1 == 1)?;
@@ -66,7 +66,7 @@ impl Sides {
     }
 }
 
-/// Adds a side, or takes away its opposite, which runs from end to start.
+/// Adds an edge, or removes the opposite edge from end to start.
 fn toggle(leaving: &mut [u8], [start, end]: [usize; 2], direction: usize) {
     let opposite = 1 << ((direction + 2) % 4);
     if leaving[end] & opposite != 0 {
@@ -76,32 +76,32 @@ fn toggle(leaving: &mut [u8], [start, end]: [usize; 2], direction: usize) {
     }
 }
 
-/// Every outline of a mask, of its parts and of their holes, from top to bottom and left to right by their first corner, from which they
-/// run east. Where an outline touches itself in a corner it is cut into two, so that each is simple, as GeoJSON and OGC Simple Features
-/// want it.
+/// Returns the outlines of all parts of a mask and of their holes, sorted by their first corner from top to bottom and left to right.
+/// The first edge runs east. An outline that touches itself at a corner is split, so that each one is simple, as GeoJSON and OGC
+/// Simple Features require.
 pub(crate) fn outlines(mask: &Mask) -> Vec<Ring> {
-    let Some(mut sides) = Sides::of(mask) else { return Vec::new() };
+    let Some(mut edges) = Edges::of(mask) else { return Vec::new() };
     let mut rings = Vec::new();
-    for start in 0..sides.leaving.len() {
-        while sides.leaving[start] & 1 == 1 {
-            sides.leaving[start] &= !1;
-            sides.leaving[start] |= PASSED;
-            let (mut ring, mut corner, mut direction) = (vec![sides.place(start)], sides.step(start, 0), 0);
+    for start in 0..edges.leaving.len() {
+        while edges.leaving[start] & 1 == 1 {
+            edges.leaving[start] &= !1;
+            edges.leaving[start] |= PASSED;
+            let (mut ring, mut corner, mut direction) = (vec![edges.place(start)], edges.step(start, 0), 0);
             while corner != start {
-                // Every corner that is entered is left.
-                let Some(next) = sides.take(corner, direction) else { break };
+                // Each corner has as many edges that leave as edges that arrive.
+                let Some(next) = edges.take(corner, direction) else { break };
                 if next != direction {
-                    let place = sides.place(corner);
-                    if sides.leaving[corner] & PASSED != 0 {
-                        // The loop since the first time is a ring of its own.
+                    let place = edges.place(corner);
+                    if edges.leaving[corner] & PASSED != 0 {
+                        // The corners since the first visit are a separate ring.
                         if let Some(first) = ring.iter().position(|&other| other == place) {
                             rings.push(from_the_top(ring.split_off(first)));
                         }
                     }
-                    sides.leaving[corner] |= PASSED;
+                    edges.leaving[corner] |= PASSED;
                     ring.push(place);
                 }
-                (corner, direction) = (sides.step(corner, next), next);
+                (corner, direction) = (edges.step(corner, next), next);
             }
             rings.push(ring);
         }
@@ -110,7 +110,7 @@ pub(crate) fn outlines(mask: &Mask) -> Vec<Ring> {
     rings
 }
 
-/// The ring from its first corner, row by row, that it leaves to the east.
+/// Rotates a ring to start at its first corner in row-major order with an edge to the east.
 fn from_the_top(mut ring: Ring) -> Ring {
     let east = |&i: &usize| ring[(i + 1) % ring.len()][0] > ring[i][0];
     let first = (0..ring.len()).filter(east).min_by_key(|&i| [ring[i][1], ring[i][0]]);
@@ -118,12 +118,12 @@ fn from_the_top(mut ring: Ring) -> Ring {
     ring
 }
 
-/// The parts of a mask: of each its outline, then those of its holes.
+/// Returns the parts of a mask: for each the outline, then those of its holes.
 fn polygons(mask: &Mask) -> Vec<Vec<Ring>> {
     let (outer, holes): (Vec<_>, Vec<_>) = outlines(mask).into_iter().partition(|ring| twice_area(ring) > 0);
     let mut parts: Vec<Vec<Ring>> = outer.into_iter().map(|ring| vec![ring]).collect();
     for hole in holes {
-        // The pixel below the first side is inside.
+        // The pixel below the first edge is inside the part.
         let around = parts.iter_mut().filter(|part| contains(&part[0], hole[0])).min_by_key(|p| twice_area(&p[0]));
         if let Some(part) = around {
             part.push(hole);
@@ -132,7 +132,7 @@ fn polygons(mask: &Mask) -> Vec<Vec<Ring>> {
     parts
 }
 
-/// Twice the area, positive where the inside lies to the right.
+/// Returns twice the area, positive if the inside is to the right.
 fn twice_area(ring: &Ring) -> i64 {
     let next = ring.iter().cycle().skip(1);
     ring.iter().zip(next).map(|(a, b)| i64::from(a[0]) * i64::from(b[1]) - i64::from(b[0]) * i64::from(a[1])).sum()
@@ -145,14 +145,14 @@ fn contains(ring: &Ring, [x, y]: [u32; 2]) -> bool {
     crossed.count() % 2 == 1
 }
 
-/// The features of these objects. `name` gives each a name that no other has, `measure` what is measured of it and of the nucleus of a cell.
+/// Returns the features of these objects. `name` returns a unique name, `measure` the measurements of an object and of its nucleus.
 pub(crate) fn collection(
     objects: &[&ObjectTruth],
     name: impl Fn(&ObjectTruth) -> String,
     measure: impl Fn(&ObjectTruth, Option<&ObjectTruth>) -> Value,
 ) -> Value {
     let find = |id: u32, part: Part| objects.iter().copied().find(|o| o.id == id && o.part == part);
-    // A nucleus goes with its cell, if that is there.
+    // A nucleus is part of its cell, if the image shows the cell.
     let own = objects.iter().filter(|o| o.part != Part::Nucleus || find(o.id, Part::Cytoplasm).is_none());
     let features = own.map(|object| {
         let is_cell = object.part == Part::Cytoplasm;
@@ -177,10 +177,10 @@ pub(crate) fn collection(
     json!({ "type": "FeatureCollection", "features": features.collect::<Vec<_>>() })
 }
 
-/// A polygon, or several where the mask falls apart.
+/// Returns a polygon, or several if the mask has several parts.
 fn shape(mask: &Mask) -> Value {
     let mut parts = polygons(mask);
-    // A ring ends where it begins.
+    // GeoJSON repeats the first corner.
     for ring in parts.iter_mut().flatten() {
         ring.extend(ring.first().copied());
     }
@@ -190,10 +190,10 @@ fn shape(mask: &Mask) -> Value {
     }
 }
 
-/// The UUID of a name, the same whenever it is made.
+/// Returns a UUID derived from a name.
 fn uuid(name: &str) -> String {
     let hex = sha256(name.as_bytes());
-    // Version 8: made as the maker likes; variant 8: RFC 9562.
+    // Version 8 (custom) and variant 8 of RFC 9562.
     format!("{}-{}-8{}-8{}-{}", &hex[..8], &hex[8..12], &hex[13..16], &hex[17..20], &hex[20..32])
 }
 
@@ -208,14 +208,14 @@ mod tests {
     }
 
     #[test]
-    fn a_ring_with_an_island_and_a_touching_corner_falls_into_its_parts() {
+    fn rings_islands_and_touching_corners_are_separate_parts() {
         let parts = polygons(&mask(&["#####.", "#...#.", "#.#.#.", "#...#.", "#####.", ".....#"]));
         let areas: Vec<Vec<i64>> = parts.iter().map(|part| part.iter().map(|r| twice_area(r) / 2).collect()).collect();
         assert_eq!(areas, [vec![25, -9], vec![1], vec![1]]);
         assert_eq!(parts[1][0], [[2, 2], [3, 2], [3, 3], [2, 3]]);
         assert_eq!(parts[2][0], [[5, 5], [6, 5], [6, 6], [5, 6]]);
         assert!(polygons(&Mask::default()).is_empty());
-        // Pixels that touch in a corner and are joined elsewhere enclose a hole that reaches to that corner.
+        // Pixels that touch at a corner and are joined elsewhere enclose a hole up to that corner.
         let parts = polygons(&mask(&["###", "#.#", "##."]));
         let areas: Vec<Vec<i64>> = parts.iter().map(|part| part.iter().map(|r| twice_area(r) / 2).collect()).collect();
         assert_eq!(areas, [vec![8, -1]]);
@@ -224,7 +224,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn filled_by_the_even_odd_rule_the_outlines_are_the_mask(
+        fn outlines_filled_by_the_even_odd_rule_equal_the_mask(
             width in 1_usize..14,
             height in 1_usize..12,
             pixels in proptest::collection::vec(proptest::bool::weighted(0.6), 14 * 12),
@@ -243,7 +243,7 @@ mod tests {
             prop_assert_eq!(area, 2 * mask.area() as i64);
             prop_assert!(rings.is_sorted_by_key(|ring| [ring[0][1], ring[0][0]]));
             for ring in &rings {
-                prop_assert!(ring[1][0] > ring[0][0] && ring[1][1] == ring[0][1], "the first side runs east");
+                prop_assert!(ring[1][0] > ring[0][0] && ring[1][1] == ring[0][1], "the first edge runs east");
                 let corners: std::collections::BTreeSet<_> = ring.iter().collect();
                 prop_assert_eq!(corners.len(), ring.len(), "no corner twice");
                 let turns = ring.iter().zip(ring.iter().cycle().skip(1));

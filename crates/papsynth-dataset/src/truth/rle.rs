@@ -1,17 +1,16 @@
-//! Run-length masks as COCO writes them.
+//! Run-length masks of COCO.
 //!
-//! Column by column from the left, the number of pixels outside, inside, outside, … the mask; each number from the
-//! fourth on as the difference to the last but one, in groups of five bits as printable characters.
+//! In column-major order, the numbers of pixels outside, inside, outside, … the mask. From the fourth number on, the
+//! difference to the number two before. Groups of five bits are printable characters.
 
 use papsynth::truth::{Mask, Run};
 
 use crate::error::Problem;
 
-/// Largest side of an image whose masks are decoded, as wide as a field may be: a bound on what a short hostile string
-/// can ask for.
+/// Largest width or height of a decoded mask, the largest size of a field. It bounds the memory for a short string.
 const MAX_SIDE: usize = 1 << 15;
 
-/// The `counts` of a mask in an image of `width` x `height` pixels.
+/// Returns the `counts` of a mask in an image of `width` x `height` pixels.
 ///
 /// # Panics
 /// If the mask has a pixel outside the image.
@@ -26,7 +25,7 @@ pub fn encode(mask: &Mask, width: usize, height: usize) -> String {
     out
 }
 
-/// The `counts` of a mask in an image of the size of its box; none of an empty one.
+/// Returns the `counts` of a mask within its bounding box; an empty string for an empty mask.
 #[cfg(feature = "zarr")]
 pub(crate) fn encode_in_box(mask: &Mask) -> String {
     let Some(bounds) = mask.bounds() else { return String::new() };
@@ -35,9 +34,9 @@ pub(crate) fn encode_in_box(mask: &Mask) -> String {
     encode(&within, bounds.width as usize, bounds.height as usize)
 }
 
-/// Pixels outside, inside, outside, … in column-major order; the last count is left out if it is 0, the first is not.
+/// Returns the numbers of pixels outside, inside, outside, … in column-major order. A last count of 0 is left out, a first one is not.
 fn counts(mask: &Mask, width: usize, height: usize) -> Vec<i64> {
-    // Rows `start..end` of each column, which grow as rows arrive from the top.
+    // Rows `start..end` of each column, extended row by row.
     let mut columns: Vec<Vec<[u32; 2]>> = vec![Vec::new(); width];
     for run in mask.runs() {
         for column in &mut columns[run.x0 as usize..run.x1 as usize] {
@@ -58,7 +57,7 @@ fn counts(mask: &Mask, width: usize, height: usize) -> Vec<i64> {
         for row in column {
             let [from, to] = row.map(|y| (x * height) as u64 + u64::from(y));
             match &mut inside {
-                // The foot of a column and the head of the next are neighbours.
+                // The end of a column and the start of the next are neighbours.
                 Some(last) if last[1] == from => last[1] = to,
                 _ => {
                     if let Some(last) = inside.replace([from, to]) {
@@ -78,7 +77,8 @@ fn counts(mask: &Mask, width: usize, height: usize) -> Vec<i64> {
     counts
 }
 
-/// Five bits a character from the lowest up, the sixth says that more follow; the last character's fifth bit is the sign.
+/// Encodes a number with five bits per character, lowest first. The sixth bit is set if more follow; the fifth bit of the last
+/// character is the sign.
 fn push(mut value: i64, out: &mut String) {
     loop {
         #[expect(clippy::cast_sign_loss, reason = "five bits")]
@@ -92,14 +92,14 @@ fn push(mut value: i64, out: &mut String) {
     }
 }
 
-/// The mask that `counts` stand for in an image of `width` x `height` pixels.
+/// Decodes the `counts` of a mask in an image of `width` x `height` pixels.
 ///
 /// # Errors
-/// If the string is no sequence of counts, or they do not fill the image exactly.
+/// If the string is invalid, or the counts do not fill the image exactly.
 pub fn decode(counts: &str, width: usize, height: usize) -> Result<Mask, Problem> {
     let wrong = |message: String| Problem::broken("RLE", message);
     if width.max(height) > MAX_SIDE {
-        return Err(wrong(format!("the image is {width} x {height}; at most {MAX_SIDE} pixels a side are accepted")));
+        return Err(wrong(format!("the image is {width} x {height} pixels; expected at most {MAX_SIDE} per side")));
     }
     let total = width * height;
     let mut rows: Vec<Vec<[u32; 2]>> = vec![Vec::new(); height];
@@ -139,12 +139,12 @@ fn pull(bytes: &mut std::str::Bytes) -> Result<Option<i64>, &'static str> {
     let mut shift = 0;
     loop {
         let Some(byte) = bytes.next() else {
-            return if shift == 0 { Ok(None) } else { Err("it ends within a number") };
+            return if shift == 0 { Ok(None) } else { Err("the string ends within a number") };
         };
         let group = match byte.checked_sub(48) {
             Some(group) if group < 64 && shift <= MAX_SHIFT => group,
             Some(group) if group < 64 => return Err("a number is too large"),
-            _ => return Err("a character is none of its alphabet"),
+            _ => return Err("invalid character"),
         };
         value |= i64::from(group & 0x1f) << shift;
         shift += 5;
@@ -165,7 +165,7 @@ mod tests {
         Mask::from_tile(&tile, width, [0, 0], width, pixels.len() / width, |v| v > 0.5)
     }
 
-    /// Column by column, pixel by pixel.
+    /// The counts, pixel by pixel in column-major order.
     fn slow_counts(pixels: &[bool], width: usize) -> Vec<i64> {
         let height = pixels.len() / width;
         let mut counts = vec![0];
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn strings_are_those_of_pycocotools() {
+    fn strings_equal_those_of_pycocotools() {
         let checkers: Vec<bool> = (0..35).map(|i| (i / 7 + i % 7) % 2 == 0).collect();
         assert_eq!(encode(&mask(&checkers, 7), 7, 5), r"011000000000000000000000000000000000");
         assert_eq!(encode(&mask(&[false; 12], 4), 4, 3), "<");
@@ -195,13 +195,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_mask_is_refused() {
+    fn invalid_strings_are_refused() {
         for (text, what) in [
             ("", "fill 0 of 12"),
             ("3", "fill 3 of 12"),
             ("=", "exceed"),
-            ("\u{20}", "alphabet"),
-            ("é", "alphabet"),
+            ("\u{20}", "invalid character"),
+            ("é", "invalid character"),
             ("P", "ends within"),
             ("oooooooooo0", "too large"),
             ("O", "negative"),
@@ -215,7 +215,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn masks_are_counted_as_pixel_by_pixel_and_read_back(
+        fn counts_equal_the_slow_version_and_are_read_back(
             width in 1_usize..24,
             pixels in proptest::collection::vec(proptest::bool::weighted(0.6), 24 * 20),
             height in 1_usize..20,

@@ -1,4 +1,4 @@
-//! Which frames to train with, to tune with, and to test with.
+//! Splits of a data set for training, validation and test.
 
 use sha2::{Digest, Sha256};
 
@@ -20,17 +20,18 @@ impl Split {
         }
     }
 
-    /// That of a frame by itself: fields of one slide may fall into several.
+    /// Returns the split of a frame, independent of its slide.
     pub(crate) fn of_field(seed: u64, index: u64) -> Self {
         Self::draw(seed, "field", index)
     }
 
-    /// That of all fields of a slide, which share its stain and its light.
+    /// Returns the split of all fields of a slide. They have the same staining and light.
     pub(crate) fn of_slide(seed: u64, slide: u64) -> Self {
         Self::draw(seed, "slide", slide)
     }
 
-    /// Eight in ten, one, one: decided by the number alone, so that a data set that grows keeps its splits.
+    /// Draws a split with probabilities 0.8, 0.1 and 0.1. It depends only on seed and number, so frames keep their splits when a data
+    /// set grows; a split of a small data set may be empty.
     fn draw(seed: u64, what: &str, number: u64) -> Self {
         let hash = Sha256::digest(format!("papsynth split {seed} {what} {number}"));
         let word = u32::from_le_bytes([hash[0], hash[1], hash[2], hash[3]]);
@@ -47,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn splits_have_their_shares_and_slides_are_not_fields() {
+    fn splits_have_their_probabilities_and_differ_between_slides_and_fields() {
         for of in [Split::of_field, Split::of_slide] {
             let count = |split| (0..20_000).filter(|&n| of(7, n) == split).count();
             // Four standard deviations.

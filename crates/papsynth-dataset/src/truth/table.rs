@@ -4,10 +4,10 @@ use papsynth::truth::{Bounds, ObjectTruth, Part, Truth};
 
 use super::rle;
 
-/// A row: an object, or a part of a cell, of an image.
+/// A row: an object or part of a cell.
 pub(crate) struct Row<'a> {
     image: u64,
-    /// Columns and rows of the image.
+    /// Width and height of the image.
     size: [usize; 2],
     object: &'a ObjectTruth,
 }
@@ -17,14 +17,14 @@ impl<'a> Row<'a> {
         truth.objects.iter().map(move |object| Self { image, size: [truth.width, truth.height], object })
     }
 
-    /// The rows of a part of a slide, whose columns ask for no image.
+    /// Returns the rows of a tile of a slide. Its table has no columns of the image.
     #[cfg(feature = "zarr")]
     pub(crate) fn of_slide(objects: &'a [ObjectTruth]) -> impl Iterator<Item = Self> {
         objects.iter().map(|object| Self { image: 0, size: [0; 2], object })
     }
 }
 
-/// What stands in a column.
+/// Type of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     Id,
@@ -32,32 +32,32 @@ pub(crate) enum Kind {
     Number,
     Text,
     Flag,
-    /// Bytes, which are not compressed again.
+    /// Bytes, stored without compression.
     #[cfg(feature = "parquet")]
     Bytes,
-    /// Any number of values of one kind, any of which may be missing.
+    /// A list of nullable values.
     List(&'static Kind),
-    /// Fields, at least one.
+    /// A struct of at least one field.
     #[cfg(feature = "parquet")]
     Struct(&'static [Head]),
 }
 
-/// The head of a column, or a field of a struct.
+/// Name and type of a column, or of a field of a struct.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Head {
     pub(crate) name: &'static str,
     pub(crate) kind: Kind,
-    /// Whether there may be nothing in it.
+    /// Whether values may be null.
     pub(crate) nullable: bool,
 }
 
 impl Head {
-    /// Of a column in which something stands in every row.
+    /// A column without nulls.
     pub(crate) const fn new(name: &'static str, kind: Kind) -> Self {
         Self { name, kind, nullable: false }
     }
 
-    /// The same in which there may be nothing.
+    /// Returns the column with nulls allowed.
     pub(crate) const fn or_null(self) -> Self {
         Self { nullable: true, ..self }
     }
@@ -95,7 +95,7 @@ impl Cell {
         }
     }
 
-    /// NaN where nothing stands.
+    /// Returns the number, or NaN for a null.
     fn number(&self) -> f64 {
         match *self {
             Self::Number(number) => number,
@@ -107,7 +107,7 @@ impl Cell {
         if let Self::List(cells) = self { cells } else { &[] }
     }
 
-    /// A number is printed with as few digits as read back to it; lists have one value a plane, separated by semicolons.
+    /// Prints the value. Numbers have the fewest digits that give the same number back; list values are separated by semicolons.
     fn print(&self) -> String {
         match self {
             Self::Id(id) => id.to_string(),
@@ -120,10 +120,10 @@ impl Cell {
     }
 }
 
-/// A column: its head, and what stands in it.
+/// A column: its head, and a function that returns the value of a row.
 pub(crate) type Named = (Head, fn(&Row) -> Cell);
 
-/// The columns of a frame's table.
+/// The columns of the table of a frame.
 const COLUMNS: [Named; 28] = [
     (Head::new("image", Kind::Whole), |row| Cell::Whole(row.image)),
     (Head::new("id", Kind::Id), |row| Cell::Id(row.object.id)),
@@ -137,11 +137,11 @@ const COLUMNS: [Named; 28] = [
     (Head::new("centre_y_um", Kind::Number), |row| Cell::Number(row.object.centre_um[1])),
     (Head::new("depth_um", Kind::Number), |row| Cell::Number(row.object.depth_um)),
     (Head::new("rotation_deg", Kind::Number), |row| Cell::Number(row.object.rotation_deg)),
-    (Head::new("stain", Kind::Number), |row| Cell::Number(row.object.stain)),
+    (Head::new("mean_absorbance", Kind::Number), |row| Cell::Number(row.object.mean_absorbance)),
     (Head::new("tint", Kind::Text), |row| Cell::text(row.object.tint_name())),
     (Head::new("area_um2", Kind::Number), |row| Cell::Number(row.object.area_um2)),
     (Head::new("area_px", Kind::Whole), |row| Cell::Whole(row.object.amodal.area())),
-    (Head::new("front_area_px", Kind::Whole), |row| Cell::Whole(row.object.front.area())),
+    (Head::new("visible_area_px", Kind::Whole), |row| Cell::Whole(row.object.visible.area())),
     (Head::new("bbox_x_px", Kind::Whole).or_null(), |row| bounds(row, |b| b.x)),
     (Head::new("bbox_y_px", Kind::Whole).or_null(), |row| bounds(row, |b| b.y)),
     (Head::new("bbox_width_px", Kind::Whole).or_null(), |row| bounds(row, |b| b.width)),
@@ -159,26 +159,26 @@ const COLUMNS: [Named; 28] = [
     (Head::new("detectability", Kind::List(&Kind::Number)), |row| Cell::numbers(&row.object.detectability)),
 ];
 
-/// What the table with types has besides: the size of the image, and the complete and the visible mask as COCO's run lengths.
+/// Further columns of the Parquet table: image size, complete and visible mask as COCO run lengths.
 const MORE: [Named; 4] = [
     (Head::new("image_width_px", Kind::Whole), |row| Cell::Whole(row.size[0] as u64)),
     (Head::new("image_height_px", Kind::Whole), |row| Cell::Whole(row.size[1] as u64)),
     (Head::new("rle", Kind::Text), |row| Cell::text(rle::encode(&row.object.amodal, row.size[0], row.size[1]))),
-    (Head::new("front_rle", Kind::Text), |row| Cell::text(rle::encode(&row.object.front, row.size[0], row.size[1]))),
+    (Head::new("visible_rle", Kind::Text), |row| Cell::text(rle::encode(&row.object.visible, row.size[0], row.size[1]))),
 ];
 
 pub(crate) fn typed_columns() -> Vec<Named> {
     [&COLUMNS[..], &MORE].concat()
 }
 
-/// The rows of one frame as CSV, if wanted below a header, which stands even if there is no object.
+/// Returns the rows of a frame as CSV, with or without a header. The header is written even if there is no object.
 pub(crate) fn table(truth: &Truth, image: u64, header: bool) -> Vec<u8> {
     csv(header, &COLUMNS, Row::all(truth, image))
 }
 
-/// Rows as CSV, if wanted below the names of the columns.
+/// Returns rows as CSV, with or without a header.
 fn csv<'a>(header: bool, columns: &[Named], rows: impl Iterator<Item = Row<'a>>) -> Vec<u8> {
-    const FITS: &str = "rows of one length can be written to memory";
+    const FITS: &str = "rows of equal length can be written to memory";
     let mut writer = csv::Writer::from_writer(Vec::new());
     if header {
         writer.write_record(columns.iter().map(|(head, _)| head.name)).expect(FITS);
@@ -189,12 +189,12 @@ fn csv<'a>(header: bool, columns: &[Named], rows: impl Iterator<Item = Row<'a>>)
     writer.into_inner().expect(FITS)
 }
 
-/// The columns of the table of a slide that are those of a frame's table, in their order; another, `rle`, follows.
+/// The columns of the table of a slide that are also in the table of a frame. The column `rle` follows.
 #[cfg(feature = "zarr")]
-const OF_SLIDE: &str = "id,part,kind,class,bethesda,traits,cluster,centre_x_um,centre_y_um,depth_um,rotation_deg,stain,\
+const OF_SLIDE: &str = "id,part,kind,class,bethesda,traits,cluster,centre_x_um,centre_y_um,depth_um,rotation_deg,mean_absorbance,\
     tint,area_um2,area_px,truncated,bbox_x_px,bbox_y_px,bbox_width_px,bbox_height_px,defocus_um";
 
-/// The columns of the table of a part of a slide. A mask stands in its box alone: the run lengths are those of an image of the box's size.
+/// Returns the columns of the table of a tile of a slide. `rle` has the run lengths of the mask within its bounding box.
 #[cfg(feature = "zarr")]
 pub(crate) fn slide_columns() -> Vec<Named> {
     let mask: Named = (Head::new("rle", Kind::Text), |row| Cell::text(rle::encode_in_box(&row.object.amodal)));
@@ -207,22 +207,22 @@ pub(crate) fn slide_table(objects: &[ObjectTruth]) -> Vec<u8> {
     csv(true, &slide_columns(), Row::of_slide(objects))
 }
 
-/// What stands in a column of the table of objects.
+/// The values of a column of the table of objects.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Column {
-    /// Whole numbers: ids, pixels.
+    /// Integers: ids, pixels.
     Whole(Vec<u64>),
-    /// Numbers; NaN where there is none.
+    /// Numbers; NaN for missing values.
     Number(Vec<f64>),
-    /// Truth values.
+    /// Booleans.
     Flag(Vec<bool>),
-    /// Texts.
+    /// Strings.
     Text(Vec<String>),
-    /// One number a plane.
+    /// For each row, one number per plane.
     Numbers(Vec<Vec<f64>>),
 }
 
-/// The table of the objects of an image, column by column: those of `objects.csv`.
+/// Returns the columns of the table of the objects of an image, as in `objects.csv`.
 #[must_use]
 pub fn columns(truth: &Truth, image: u64) -> Vec<(&'static str, Column)> {
     let column = |(head, cell): Named| (head.name, Column::of(head, Row::all(truth, image).map(|row| cell(&row))));
@@ -233,7 +233,7 @@ impl Column {
     fn of(head: Head, cells: impl Iterator<Item = Cell>) -> Self {
         match head.kind {
             Kind::Id | Kind::Whole if !head.nullable => {
-                Self::Whole(cells.map(|cell| cell.whole().expect("a whole number in every row")).collect())
+                Self::Whole(cells.map(|cell| cell.whole().expect("columns of integers have no nulls")).collect())
             }
             Kind::Id | Kind::Whole | Kind::Number => Self::Number(cells.map(|cell| cell.number()).collect()),
             Kind::Flag => Self::Flag(cells.map(|cell| cell == Cell::Flag(true)).collect()),
@@ -259,7 +259,7 @@ fn centroid(row: &Row, axis: usize) -> Cell {
     row.object.amodal.centroid().map_or(Cell::Nothing, |c| Cell::Number(c[axis]))
 }
 
-/// The plane in which an object is easiest to detect; of equal ones the first.
+/// Returns the plane with the largest detectability; the first of equal ones.
 fn best(row: &Row) -> Option<usize> {
     let detectability = &row.object.detectability;
     (0..detectability.len()).reduce(|best, i| if detectability[i] > detectability[best] { i } else { best })

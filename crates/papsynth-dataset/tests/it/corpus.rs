@@ -1,4 +1,4 @@
-//! Inputs that fuzzing has kept, each through its parser. The targets of `fuzz/` share the checks.
+//! Inputs found by fuzzing, each with its parser. The targets of `fuzz/` use the same checks.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -34,12 +34,12 @@ mod sound;
 #[path = "../parsers/stack.rs"]
 mod stack;
 
-/// Gives every input of a target to its check, each cut off at three places, and as many that are changed at random as `PAPSYNTH_FUZZ` says.
+/// Checks every input of a target, three truncations of it, and `PAPSYNTH_FUZZ` random changes.
 fn replay(target: &str, check: fn(&[u8])) {
     replay_part(target, 1, check);
 }
 
-/// [`replay`] with one in `part` of the changed inputs, for checks that take milliseconds.
+/// As [`replay`] with one in `part` of the changed inputs, for slow checks.
 fn replay_part(target: &str, part: u64, check: fn(&[u8])) {
     let rounds: u64 = std::env::var("PAPSYNTH_FUZZ").ok().and_then(|n| n.parse().ok()).unwrap_or(0) / part;
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus").join(target);
@@ -52,7 +52,7 @@ fn replay_part(target: &str, part: u64, check: fn(&[u8])) {
     assert!(!paths.is_empty(), "{} is empty", folder.display());
     let inputs: Vec<Vec<u8>> = paths.iter().map(|path| fs::read(path).unwrap()).collect();
     for (path, bytes) in paths.iter().zip(&inputs) {
-        // Shown if the check fails.
+        // Printed if the check fails.
         eprintln!("{}", path.display());
         for length in [bytes.len(), bytes.len() * 3 / 4, bytes.len() / 2, bytes.len().min(9)] {
             check(&bytes[..length]);
@@ -72,7 +72,7 @@ fn replay_part(target: &str, part: u64, check: fn(&[u8])) {
     }
 }
 
-/// The usual little generator: what is tried must only be the same every time.
+/// A linear congruential generator: the changes are the same in every run.
 struct Numbers(u64);
 
 impl Numbers {
@@ -81,7 +81,8 @@ impl Numbers {
         usize::try_from((self.0 >> 33) % u64::try_from(end.max(1)).unwrap()).unwrap()
     }
 
-    /// One of the inputs with a few changes: bytes, numbers as text, pieces moved, repeated, left out or taken from another.
+    /// Returns an input with a few changes: bytes, numbers, and pieces that are moved, repeated, removed or copied from
+    /// another input.
     fn mutant(&mut self, inputs: &[Vec<u8>]) -> Vec<u8> {
         const WORDS: [&[u8]; 16] = [
             b"0",

@@ -1,4 +1,4 @@
-//! No bytes make a reader panic, hang, or ask for vast memory.
+//! No input makes a reader panic, hang, or allocate much memory.
 
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the numbers are small")]
 
@@ -12,7 +12,7 @@ use proptest::prelude::*;
 use std::fs;
 use std::sync::LazyLock;
 
-/// A data set of one small stack and one small image, as good seeds of bad files.
+/// The files of a data set with one small stack and one small image, as seeds of damaged files.
 static FILES: LazyLock<Vec<(String, Vec<u8>)>> = LazyLock::new(|| {
     let scratch = Scratch::new("hostile");
     let info =
@@ -29,7 +29,7 @@ static FILES: LazyLock<Vec<(String, Vec<u8>)>> = LazyLock::new(|| {
     contents(scratch.path())
 });
 
-/// Gives bytes to every parser.
+/// Runs every parser.
 fn parse(bytes: &[u8]) {
     let limits = Limits { max_pixels: 1 << 20, ..Limits::default() };
     let _ = GreyImage::decode(bytes, &limits);
@@ -51,7 +51,7 @@ proptest! {
     #[test]
     fn good_files_with_changes(file in any::<prop::sample::Index>(), changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6), cut in any::<prop::sample::Index>(), keep in any::<bool>()) {
         let (_, bytes) = &FILES[file.index(FILES.len())];
-        // The head is where sizes and offsets stand.
+        // The head contains sizes and offsets.
         let mut bytes = bytes.clone();
         for (i, (at, value)) in changes.iter().enumerate() {
             let range = if i % 2 == 0 { bytes.len() } else { bytes.len().min(200) };
@@ -78,11 +78,11 @@ fn records_that_point_outside_the_folder_are_refused() {
         assert!(problem.contains("outside"), "{path}: {problem}");
     }
     let newer = text.replacen("\"version\": 2", "\"version\": 3", 1);
-    assert!(ShardRecord::from_json(newer.as_bytes()).unwrap_err().to_string().contains("version is 3"));
+    assert!(ShardRecord::from_json(newer.as_bytes()).unwrap_err().to_string().contains("version: expected 2, found 3"));
 }
 
 #[test]
-fn a_data_set_with_damaged_files_is_looked_at_without_harm() {
+fn a_data_set_with_damaged_files_is_inspected_without_panic() {
     let scratch = Scratch::new("hostile-set");
     for (name, bytes) in FILES.iter() {
         let path = scratch.join(name);
@@ -93,40 +93,40 @@ fn a_data_set_with_damaged_files_is_looked_at_without_harm() {
         DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout: &Layout::default() };
     let dataset = Dataset::create_or_resume(scratch.path(), &info).unwrap();
     assert_eq!(inspect(scratch.path(), Check::Hashes).unwrap().frames, 2);
-    // A change of content that leaves the size alone is found by its hash; merging says which file is wrong.
+    // A change that keeps the size is found by its hash; merging names the damaged file.
     let coco = scratch.join("shards/000000.coco.json");
     let mut bytes = fs::read(&coco).unwrap();
     bytes[0] = b'[';
     fs::write(&coco, &bytes).unwrap();
     let overview = inspect(scratch.path(), Check::Hashes).unwrap();
-    assert!(overview.defects[0].message.contains("000000.coco.json has another content"));
+    assert!(overview.damaged_shards[0].to_string().contains("000000.coco.json: changed"));
     let error = dataset.finish().unwrap_err();
     assert!(!error.is_io() && error.to_string().contains("000000.coco.json"), "{error}");
     fs::write(scratch.join("manifest.json"), "[").unwrap();
     assert!(inspect(scratch.path(), Check::Sizes).unwrap_err().to_string().contains("manifest.json"));
 }
 
-/// A record whose numbers would make a reader allocate, divide by nothing or look for frames elsewhere, and whose own hash is right.
+/// Records with valid hashes whose numbers would cause large allocations, divisions by zero or wrong frames.
 #[test]
-fn records_of_impossible_frames_are_refused() {
+fn records_of_invalid_frames_are_refused() {
     let (_, record) = FILES.iter().find(|(name, _)| name == "shards/000000.json").unwrap();
     let good = ShardRecord::from_json(record).unwrap();
-    type Lie = (fn(&mut ShardRecord), &'static str);
-    let lies: [Lie; 12] = [
-        (|r| r.frames[0].width = usize::MAX, "pixels"),
-        (|r| r.frames[0].height = 0, "pixels"),
-        (|r| r.frames[0].height = 32_769, "pixels"),
+    type Change = (fn(&mut ShardRecord), &'static str);
+    let changes: [Change; 12] = [
+        (|r| r.frames[0].width = usize::MAX, "size"),
+        (|r| r.frames[0].height = 0, "size"),
+        (|r| r.frames[0].height = 32_769, "size"),
         (|r| r.frames[0].channels = usize::MAX, "channels"),
         (|r| r.frames[0].bits = 0, "bits"),
         (|r| r.frames[0].bits = u32::MAX, "bits"),
         (|r| r.frames[0].planes_um.clear(), "planes"),
         (|r| r.frames[0].planes_um.resize(1025, 0.0), "planes"),
         (|r| r.frames[0].index = u64::MAX, "shard"),
-        (|r| r.frames.push(r.frames[0].clone()), "order"),
+        (|r| r.frames.push(r.frames[0].clone()), "ascending"),
         (|r| r.layout.frames_per_shard = 0, "frames_per_shard"),
         (|r| r.layout.formats.clear(), "format"),
     ];
-    for (number, (lie, named)) in lies.into_iter().enumerate() {
+    for (number, (lie, named)) in changes.into_iter().enumerate() {
         let mut record = good.clone();
         lie(&mut record);
         let problem = ShardRecord::from_json(&serde_json::to_vec(&record).unwrap()).unwrap_err().to_string();
@@ -141,9 +141,9 @@ fn records_of_impossible_frames_are_refused() {
     }
 }
 
-/// A small file that says it is an image as wide as can be is refused before anything is allocated for it.
+/// A small file with a huge size in its head is refused before memory is allocated.
 #[test]
-fn images_that_claim_to_be_vast_are_refused_by_their_size() {
+fn images_with_huge_sizes_are_refused() {
     let png = |width: u32, height: u32| {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
@@ -151,7 +151,7 @@ fn images_that_claim_to_be_vast_are_refused_by_their_size() {
         encoder.write_header().unwrap().write_image_data(&[0]).unwrap();
         bytes[16..20].copy_from_slice(&width.to_be_bytes());
         bytes[20..24].copy_from_slice(&height.to_be_bytes());
-        // The check sum of the head, by the definition of PNG.
+        // The CRC of the head, as defined by PNG.
         let crc = !bytes[12..29].iter().fold(u32::MAX, |crc, byte| {
             (0..8).fold(crc ^ u32::from(*byte), |crc, _| (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg()))
         });
@@ -194,7 +194,7 @@ fn images_that_claim_to_be_vast_are_refused_by_their_size() {
             );
         }
     }
-    // Within the limits, but with nothing behind: truncated or broken, not read.
+    // Sizes within the limits without data are truncated.
     for bytes in [
         png(8192, 8192),
         tiff(8192, 8192, 8192, 1 << 26),
@@ -206,10 +206,10 @@ fn images_that_claim_to_be_vast_are_refused_by_their_size() {
     }
 }
 
-/// Nothing is read, written or removed behind a link in a data set, wherever it is.
+/// No file behind a symbolic link in a data set is read, written or removed.
 #[test]
 #[cfg(unix)]
-fn links_in_a_data_set_are_followed_neither_to_read_nor_to_write() {
+fn symbolic_links_in_a_data_set_are_not_followed() {
     use std::os::unix::fs::symlink;
     use std::sync::atomic::AtomicBool;
     let info =
@@ -217,7 +217,7 @@ fn links_in_a_data_set_are_followed_neither_to_read_nor_to_write() {
     let go_on = |path: &std::path::Path| -> Result<(), papsynth_dataset::Error> {
         let dataset = Dataset::create_or_resume(path, &info)?;
         for frame in [frame(0, 1, 8, 1), frame(1, 2, 12, 70_000)] {
-            if dataset.whole(frame.finished.scene.key.index, Check::Hashes)?.is_none() {
+            if dataset.complete_record(frame.finished.scene.key.index, Check::Hashes)?.is_none() {
                 let mut writer = dataset.shard_writer(frame.finished.scene.key.index)?;
                 writer.begin(&frame.finished.scene)?;
                 frame.planes.iter().try_for_each(|plane| writer.write_plane(plane))?;
@@ -236,16 +236,16 @@ fn links_in_a_data_set_are_followed_neither_to_read_nor_to_write() {
             fs::create_dir_all(path.parent().unwrap()).unwrap();
             fs::write(path, bytes).unwrap();
         }
-        // What is there lies outside, and a link in its place.
+        // Moves the file or folder outside and replaces it by a symbolic link.
         fs::rename(scratch.join(name), elsewhere.join("it")).unwrap();
         symlink(elsewhere.join("it"), scratch.join(name)).unwrap();
         let before = contents(elsewhere.path());
         let found = verify(scratch.path(), None);
-        assert!(found.as_ref().map_or(true, |verdict| verdict.root.is_none()), "{name}: {found:?}");
+        assert!(found.as_ref().map_or(true, |report| report.root.is_none()), "{name}: {found:?}");
         let to = Scratch::new("links-converted");
         let layout = Layout::new([Format::Cellpose]);
         let converted = convert(scratch.path(), to.path(), &layout, &AtomicBool::new(false), &|_| {});
-        // What is merged of shards is not read to convert them; tables and COCO documents of all are merged anew.
+        // Conversion does not read merged files.
         let is_read = name.contains('/')
             || folders.contains(&name)
             || ["manifest.json", "recipe.toml", "model.json"].contains(&name);
@@ -253,11 +253,11 @@ fn links_in_a_data_set_are_followed_neither_to_read_nor_to_write() {
         let gone_on = go_on(scratch.path());
         let _ = clean(scratch.path(), true);
         assert_eq!(contents(elsewhere.path()), before, "{name}");
-        // A link in the place of a file is replaced; behind one in the place of a folder nothing is done.
-        let mended = verify(scratch.path(), None).is_ok_and(|verdict| verdict.root.is_some());
+        // A link with the name of a file is replaced; a link with the name of a folder is not followed.
+        let mended = verify(scratch.path(), None).is_ok_and(|report| report.root.is_some());
         assert!(mended != folders.contains(&name) && mended == gone_on.is_ok(), "{name}: {gone_on:?}");
     }
-    // A link that looks like a file of a killed run goes; what it leads to stays.
+    // A link with the name of a temporary file is removed, but not its target.
     let (scratch, elsewhere) = (Scratch::new("links-tmp"), Scratch::new("links-precious"));
     go_on(scratch.path()).unwrap();
     fs::write(elsewhere.join("precious"), "mine").unwrap();

@@ -85,12 +85,12 @@ fn the_table_says_what_the_csv_says_and_has_the_masks() {
         });
         assert_eq!(printed.collect::<Vec<_>>(), line);
     }
-    let masks = rows(&scratch.join("objects.parquet"), &["rle", "front_rle", "image_width_px", "image_height_px"]);
+    let masks = rows(&scratch.join("objects.parquet"), &["rle", "visible_rle", "image_width_px", "image_height_px"]);
     let objects = frames.iter().flat_map(|frame| &frame.finished.truth.objects);
     assert_eq!(objects.clone().count(), masks.len());
     for (row, object) in masks.iter().zip(objects) {
         assert_eq!(rle::decode(text(&row[0]), WIDTH, HEIGHT).unwrap(), object.amodal);
-        assert_eq!(rle::decode(text(&row[1]), WIDTH, HEIGHT).unwrap(), object.front);
+        assert_eq!(rle::decode(text(&row[1]), WIDTH, HEIGHT).unwrap(), object.visible);
         assert_eq!(row[2..], [Field::Long(WIDTH as i64), Field::Long(HEIGHT as i64)]);
     }
     // Text alone, if that is wanted, and the other is another data set.
@@ -171,7 +171,7 @@ fn images_are_read_back_only_from_files_that_are_as_recorded() {
     write(scratch.path(), &Layout { frames_per_shard: 2, ..Layout::new([Format::Huggingface]) }, &[frame(0, 1, 8, 1)]);
     let (name, mut bytes) = contents(&scratch.join("huggingface/data")).remove(0);
     let dataset = Dataset::open(scratch.path()).unwrap();
-    let place = dataset.places().unwrap()[0];
+    let place = dataset.frame_locations().unwrap()[0];
     let summary = dataset.summary(place).unwrap();
     let mut planes = 0;
     dataset.planes(&summary, 0, &mut |_, _| planes += 1).unwrap();

@@ -1,4 +1,4 @@
-//! What users bring is read as it is meant, or refused by what is wrong with it.
+//! Users' files are read, or refused with an error that gives the cause.
 
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the numbers are small")]
 
@@ -11,8 +11,8 @@ use crate::support::Scratch;
 use papsynth::recipe::{Labels, Layout, Recipe};
 use papsynth::truth::LabelMap;
 use papsynth_dataset::read::{
-    GreyImage, Limits, NucleusSample, components, image_files, label_map, outlines, read_inputs, read_label_map,
-    read_nuclei, read_outlines,
+    GreyImage, LevelImage, Limits, NucleusSample, Stack, components, image_files, label_map, outlines, read_inputs,
+    read_label_map, read_nuclei, read_outlines,
 };
 use papsynth_dataset::{Error, Problem};
 use png::{BitDepth, ColorType};
@@ -76,7 +76,7 @@ fn grey_images_of_every_depth_are_read() {
 }
 
 #[test]
-fn colours_are_refused_unless_they_are_grey() {
+fn colour_images_are_refused_unless_all_pixels_are_grey() {
     let rgb = |bytes: &[u8]| png(bytes, [2, 1], ColorType::Rgb, BitDepth::Eight);
     assert_eq!(grey(&rgb(&[5, 5, 5, 6, 6, 6])).unwrap().grey, [5, 6]);
     assert_eq!(grey(&rgb(&[5, 5, 5, 6, 7, 6])), Err(Problem::NotGrey { what: "coloured", x: 1, y: 0 }));
@@ -91,24 +91,24 @@ fn colours_are_refused_unless_they_are_grey() {
 }
 
 #[test]
-fn what_cannot_be_read_says_why() {
+fn errors_give_the_cause() {
     let says = |bytes: &[u8], what: &str| {
         let problem = grey(bytes).unwrap_err().to_string();
         assert!(problem.contains(what), "{problem}");
     };
-    says(b"GIF89a", "neither a PNG nor a TIFF");
-    says(b"", "neither a PNG nor a TIFF");
+    says(b"GIF89a", "not a PNG, JPEG or TIFF");
+    says(b"", "not a PNG, JPEG or TIFF");
     says(b"\x89PN", "PNG file is truncated");
     says(&tiff::<colortype::Gray32Float>(&[1.0], [1, 1], 1), "floating-point");
     says(&tiff::<colortype::Gray32>(&[1], [1, 1], 1), "32 bit samples");
     says(&tiff::<colortype::GrayI16>(&[-1], [1, 1], 1), "signed");
     says(&tiff::<colortype::Gray8>(&[1], [1, 1], 2), "several images");
-    // Vast images in a few bytes are refused by their stated size.
+    // The stated size is checked before the image is decoded.
     let mut vast = grey_png(&[0; 4], 2);
     vast[16..24].copy_from_slice(&[0, 0, 0x7f, 0xff, 0, 0, 0x7f, 0xff]);
     let crc = crc(&vast[12..29]);
     vast[29..33].copy_from_slice(&crc.to_be_bytes());
-    says(&vast, "the image is 32767 x 32767; accepted are");
+    says(&vast, "the image is 32767 x 32767 pixels; expected");
     let mut wide = tiff::<colortype::Gray8>(&[0; 4], [2, 2], 1);
     let at = wide.windows(4).position(|w| w == [0, 1, 4, 0]).unwrap() + 8;
     wide[at..at + 4].copy_from_slice(&4_000_000_u32.to_le_bytes());
@@ -123,7 +123,7 @@ fn crc(bytes: &[u8]) -> u32 {
 }
 
 #[test]
-fn files_that_are_cut_anywhere_are_refused() {
+fn truncated_files_are_refused() {
     let pixels: Vec<u8> = (0..=255).collect();
     let wide: Vec<u16> = (0..256).map(|i| i * 257).collect();
     for (kind, bytes) in [
@@ -133,15 +133,83 @@ fn files_that_are_cut_anywhere_are_refused() {
     ] {
         assert!(grey(&bytes).is_ok());
         for length in 0..bytes.len() {
-            // Padding behind the last directory may be missing.
             let read = grey(&bytes[..length]);
             assert!(read.is_err(), "{kind} of {length} of {} bytes", bytes.len());
         }
     }
 }
 
+/// A file of the corpus of the fuzz targets, written by Pillow or tifffile.
+fn corpus(name: &str) -> Vec<u8> {
+    fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus/image").join(name)).unwrap()
+}
+
+/// The images that `jpeg-*` encode, of 40 x 24 pixels.
+fn ramps(channels: usize) -> Vec<u16> {
+    let pixels = (0..24_u16).flat_map(|y| (0..40).map(move |x| [60 + 3 * x + 2 * y, 200 - 2 * x, 40 + 4 * y]));
+    pixels.flat_map(|pixel| pixel[..channels].to_vec()).collect()
+}
+
 #[test]
-fn files_are_named_in_errors_and_kinds_of_errors_told_apart() {
+fn jpeg_files_are_read_alone_and_in_tiff() {
+    for (name, channels, tolerance) in [
+        ("jpeg-grey.jpg", 1, 2),
+        ("jpeg-progressive.jpg", 1, 2),
+        ("jpeg-colour.jpg", 3, 8),
+        ("jpeg-grey.tif", 1, 2),
+        ("jpeg-colour.tif", 3, 3),
+        ("jpeg-ycbcr.tif", 3, 40),
+    ] {
+        let bytes = corpus(name);
+        let image = LevelImage::decode(&bytes, &Limits::default()).unwrap();
+        let is_grey = image.levels.chunks(3).all(|pixel| pixel.iter().all(|v| *v == pixel[0]));
+        let found = if name == "jpeg-progressive.jpg" && image.channels == 3 {
+            assert!(is_grey);
+            image.levels.iter().step_by(3).copied().collect()
+        } else {
+            image.levels.clone()
+        };
+        assert_eq!((image.width, image.height(), image.white), (40, 24, 255), "{name}");
+        let errors = found.iter().zip(ramps(channels)).map(|(a, b)| a.abs_diff(b));
+        assert_eq!(found.len(), 960 * channels, "{name}");
+        let (sum, worst) = errors.fold((0, 0), |(sum, worst), e| (sum + usize::from(e), worst.max(e)));
+        assert!(worst <= tolerance && sum <= 2 * found.len(), "{name}: {worst}, {sum}");
+        for length in 0..bytes.len() {
+            let read = LevelImage::decode(&bytes[..length], &Limits::default());
+            // Readers accept a JPEG without the end marker, and the tags at the end of a TIFF may be optional.
+            assert!(read.is_err() || length + 3 > bytes.len() || name.ends_with("tif"), "{name}: {length} bytes");
+        }
+    }
+    assert_eq!(Stack::decode(&corpus("jpeg-grey.tif"), &Limits::default()).unwrap().width, 40);
+}
+
+#[test]
+fn jpeg_files_are_refused_where_they_are_unsuitable() {
+    let says = |problem: Problem, what: &str| assert!(problem.to_string().contains(what), "{problem}");
+    says(labels(&corpus("jpeg-grey.jpg")).unwrap_err(), "which changes labels");
+    says(labels(&corpus("jpeg-grey.tif")).unwrap_err(), "which changes labels");
+    says(grey(&corpus("jpeg-colour.jpg")).unwrap_err(), "is coloured");
+    says(grey(&corpus("jpeg-cmyk.jpg")).unwrap_err(), "CMYK");
+    says(grey(&corpus("jpeg-vast.jpg")).unwrap_err(), "the image is 32767 x 32767");
+    // The size in the JPEG stream within a TIFF file is checked too.
+    says(grey(&corpus("jpeg-vast.tif")).unwrap_err(), "the image is 16383 x 16383");
+}
+
+#[cfg(unix)]
+#[test]
+fn pipes_are_not_read() {
+    let scratch = Scratch::new("pipe");
+    let path = scratch.join("x.png");
+    assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+    let error = GreyImage::read(&path, &Limits::default()).unwrap_err();
+    assert!(error.to_string().ends_with("x.png: is a pipe, device or socket; expected a regular file"), "{error}");
+    let fields = papsynth_dataset::field_files(scratch.path()).unwrap();
+    assert!(fields[0].read(&Limits::default()).is_err());
+    assert!(GreyImage::read(Path::new("/dev/zero"), &Limits::default()).is_err());
+}
+
+#[test]
+fn errors_name_the_file_and_its_kind() {
     let scratch = Scratch::new("read-files");
     let path = scratch.join("small.png");
     fs::write(&path, grey_png(&[1, 2, 3, 4], 2)).unwrap();
@@ -156,17 +224,17 @@ fn files_are_named_in_errors_and_kinds_of_errors_told_apart() {
 }
 
 #[test]
-fn a_nucleus_is_one_component_of_more_than_a_pixel_as_large_as_its_image() {
+fn a_nucleus_is_one_component_of_several_pixels() {
     let image = || GreyImage { width: 4, grey: vec![100; 12], white: 255 };
     let sample = |ids: &[u32]| NucleusSample::new("n", image(), &map(4, ids));
     let good = sample(&[0, 255, 0, 0, 0, 0, 255, 0, 0, 3, 0, 0]).unwrap();
     assert_eq!(good.mask.iter().sum::<f32>(), 3.0);
     let wrong = |mask: &[u32]| sample(mask).unwrap_err().to_string();
     assert!(wrong(&[0; 12]).starts_with("the mask is empty"));
-    assert!(wrong(&[0, 0, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0]).starts_with("the mask is a single pixel, at (2, 1)"));
-    assert!(wrong(&[1, 0, 1, 0, 0, 0, 0, 0, 1, 1, 1, 1]).starts_with("the mask falls into 3 separate components"));
+    assert!(wrong(&[0, 0, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0]).starts_with("the mask has only one pixel, at (2, 1)"));
+    assert!(wrong(&[1, 0, 1, 0, 0, 0, 0, 0, 1, 1, 1, 1]).starts_with("the mask has 3 connected components"));
     let wrong = NucleusSample::new("n", image(), &map(3, &[1; 12])).unwrap_err().to_string();
-    assert!(wrong.starts_with("the mask is 3 x 4, its image 4 x 3"));
+    assert!(wrong.starts_with("the mask is 3 x 4 pixels, the image 4 x 3"));
 }
 
 #[test]
@@ -186,21 +254,26 @@ fn folders_of_nuclei_are_paired_by_name() {
     put("images/.DS_Store", b"");
     put("images/notes.txt", b"");
     put("masks/b.tif", &tiff::<colortype::Gray8>(&[0, 1, 1, 0], [2, 2], 1));
-    fails("images: holds no PNG or TIFF file");
+    fails("images: the folder has no PNG, JPEG or TIFF file");
     put("images/b.png", &grey_png(&[9, 8, 7, 6], 2));
     put("images/a.png", &grey_png(&[1, 2, 3, 4], 2));
-    fails("a.png: has no mask of the same name");
+    fails("a.png: there is no mask of the same name");
     put("masks/a.PNG", &grey_png(&[255, 255, 0, 0], 2));
     let names: Vec<String> = read().unwrap().into_iter().map(|n| n.name).collect();
     assert_eq!(names, ["a", "b"]);
     put("masks/c.png", &grey_png(&[0; 4], 2));
-    fails("c.png: has no image of the same name");
+    fails("c.png: there is no image of the same name");
     put("images/c.png", &grey_png(&[0; 4], 2));
     fails("masks/c.png: the mask is empty");
     put("masks/c.png", &grey_png(&[255; 6], 2));
-    fails("masks/c.png: the mask is 2 x 3, its image 2 x 2");
+    fails("masks/c.png: the mask is 2 x 3 pixels, the image 2 x 2");
     put("images/c.tif", b"");
-    fails("has the same name as");
+    fails("only in its extension");
+    fs::remove_file(scratch.join("images/c.tif")).unwrap();
+    for name in ["d.bmp", "e.CZI", "f.webp", "g.svs"] {
+        put(&format!("images/{name}"), b"");
+    }
+    fails("images: 4 images are in other formats: d.bmp, e.CZI, f.webp and 1 more; expected PNG, JPEG or TIFF");
 }
 
 #[test]
@@ -213,17 +286,17 @@ fn outlines_are_read_by_their_columns() {
         let problem = outlines(text.as_bytes()).unwrap_err().to_string();
         assert!(problem.contains(what), "{problem}");
     };
-    says("outline,k,x_px\n", "line 1: there is no column `y_px`");
+    says("outline,k,x_px\n", "line 1: the column `y_px` is missing");
     says("outline,k,x_px,y_px\n", "no outline");
     says("outline,k,x_px,y_px\na,0,1,nan\n", "line 2: y_px is `nan`");
-    says("outline,k,x_px,y_px\na,0,1,2\na,2,1,2\n", "line 3: k is `2`; 1 is wanted");
+    says("outline,k,x_px,y_px\na,0,1,2\na,2,1,2\n", "line 3: k is `2`; expected 1");
     says("outline,k,x_px,y_px\na,0,1,2\na,1,1,2\n", "outline `a` has 2 points");
     says("outline,k,x_px,y_px\na,0,1,2\na,1,1\n", "line 3");
     says("outline,k,x_px,y_px\na,0,1,\u{fffd}\n", "line 2");
 }
 
 #[test]
-fn weight_maps_need_a_place() {
+fn weight_maps_need_a_pixel_above_0() {
     let scratch = Scratch::new("weights");
     let mut recipe = support::recipe();
     let read = |recipe: &Recipe| {
@@ -232,7 +305,7 @@ fn weight_maps_need_a_place() {
         Ok::<_, Error>((inputs.weight_map, file, named.layout))
     };
     assert_eq!(read(&recipe).unwrap(), (None, None, recipe.layout.clone()));
-    recipe.layout = Layout::Map { path: "map.png".to_owned() };
+    recipe.layout = Layout::DensityMap { path: "map.png".to_owned() };
     assert!(read(&recipe).unwrap_err().to_string().contains("map.png: there is no such file"));
     fs::write(scratch.join("map.png"), grey_png(&[0, 51, 255, 0], 2)).unwrap();
     let (found, file, layout) = read(&recipe).unwrap();
@@ -240,15 +313,15 @@ fn weight_maps_need_a_place() {
     assert_eq!((found.width, found.weights), (2, vec![0.0, 0.2, 1.0, 0.0]));
     let file = file.unwrap();
     assert_eq!(file.bytes, grey_png(&[0, 51, 255, 0], 2));
-    assert_eq!(layout, Layout::Map { path: file.name.clone() });
+    assert_eq!(layout, Layout::DensityMap { path: file.name.clone() });
     fs::write(scratch.join("map.png"), grey_png(&[0, 52, 255, 0], 2)).unwrap();
-    assert_ne!(read(&recipe).unwrap().1.unwrap().name, file.name, "another content has another name");
+    assert_ne!(read(&recipe).unwrap().1.unwrap().name, file.name, "the name depends on the content");
     recipe.layout = Layout::Labels(Labels { path: "map.png".to_owned(), smooth_um: 1.0.into() });
     assert_eq!(read(&recipe).unwrap().0.unwrap().weights, [0.0, 1.0, 1.0, 0.0]);
     fs::write(scratch.join("map.png"), grey_png(&[0; 4], 2)).unwrap();
-    let refused = |recipe: &Recipe| read(recipe).unwrap_err().to_string().contains("map.png: every pixel is 0");
+    let refused = |recipe: &Recipe| read(recipe).unwrap_err().to_string().contains("map.png: all pixels are 0");
     assert!(refused(&recipe));
-    recipe.layout = Layout::Map { path: "map.png".to_owned() };
+    recipe.layout = Layout::DensityMap { path: "map.png".to_owned() };
     assert!(refused(&recipe));
 }
 
@@ -260,13 +333,13 @@ fn too_many_regions_are_refused_before_they_are_collected() {
     };
     let limited = |max_regions| components(&checkers, &Limits { max_regions, ..Limits::default() });
     assert_eq!(limited(2500).unwrap().len(), 2500);
-    assert!(limited(2499).unwrap_err().to_string().starts_with("has more than 2499 separate regions"));
-    // However many pieces a shape has on the way down, what counts is the end.
+    assert!(limited(2499).unwrap_err().to_string().starts_with("the image has more than 2499 separate regions"));
+    // The teeth of a comb are separate regions until the last row joins them.
     let comb = LabelMap { width: 100, ids: (0..10_000).map(|i| u32::from(i >= 9_900 || i % 2 == 0)).collect() };
     assert_eq!(components(&comb, &Limits { max_regions: 1, ..Limits::default() }).unwrap().len(), 1);
 }
 
-/// Regions by filling from every pixel that has none yet.
+/// Regions by flood fill.
 fn flooded(labels: &LabelMap) -> Vec<(u32, Vec<usize>)> {
     let (width, height) = (labels.width, labels.ids.len() / labels.width);
     let mut seen = vec![false; labels.ids.len()];
@@ -296,7 +369,7 @@ fn flooded(labels: &LabelMap) -> Vec<(u32, Vec<usize>)> {
 
 proptest! {
     #[test]
-    fn components_are_those_of_flooding(width in 1_usize..20, height in 1_usize..20, ids in proptest::collection::vec(0_u32..3, 400)) {
+    fn components_equal_those_of_flood_fill(width in 1_usize..20, height in 1_usize..20, ids in proptest::collection::vec(0_u32..3, 400)) {
         let labels = map(width, &ids[..width * height]);
         let found = components(&labels, &Limits::default()).unwrap();
         let expected = flooded(&labels);
@@ -314,17 +387,17 @@ proptest! {
     }
 }
 
-/// The folder of real material, if there is one here.
+/// The folder of real images, if there is one.
 fn reference() -> Option<PathBuf> {
     let found = std::env::var_os("PAPSYNTH_REFERENCE").map(PathBuf::from).filter(|p| p.is_dir());
     if found.is_none() {
-        eprintln!("left out: PAPSYNTH_REFERENCE names no folder");
+        eprintln!("skipped: PAPSYNTH_REFERENCE is not a folder");
     }
     found
 }
 
 #[test]
-fn real_material_is_read() {
+fn real_images_are_read() {
     let Some(folder) = reference() else { return };
     let limits = Limits::default();
     for (class, count) in [("normal", 60), ("high_grade", 5)] {

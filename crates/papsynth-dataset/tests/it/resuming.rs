@@ -1,4 +1,4 @@
-//! A data set goes on where it was left, and nothing else is touched.
+//! Resumption of data sets.
 
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the numbers are small")]
 
@@ -11,7 +11,7 @@ use crate::support::{SEED, Scratch, contents, frame, recipe};
 use papsynth::model::Model;
 use papsynth::recipe::{Preset, Recipe};
 use papsynth::{Engine, Inputs, Threads};
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Layout, Outcome, Progress, Run, Share, inspect, verify};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Layout, Outcome, Progress, Run, Task, inspect, verify};
 
 fn open_with(path: &Path, recipe: &Recipe, model: &Model, seed: u64) -> Result<Dataset, Error> {
     Dataset::create_or_resume(path, &DatasetInfo { recipe, model, seed, map: None, layout: &Layout::default() })
@@ -36,7 +36,7 @@ fn refused(result: Result<Dataset, Error>, what: &str) {
 }
 
 #[test]
-fn another_data_set_in_the_folder_is_refused_by_what_differs() {
+fn another_data_set_in_the_folder_is_refused_with_the_difference() {
     let scratch = Scratch::new("identity");
     let (recipe, model) = (recipe(), Model::builtin());
     open(scratch.path()).unwrap();
@@ -51,7 +51,7 @@ fn another_data_set_in_the_folder_is_refused_by_what_differs() {
 }
 
 #[test]
-fn of_several_that_begin_at_once_one_is_the_first() {
+fn of_several_processes_that_start_at_once_one_creates_the_data_set() {
     for round in 0..30 {
         let scratch = Scratch::new(&format!("at-once-{round}"));
         let (recipe, model) = (recipe(), Model::builtin());
@@ -69,7 +69,7 @@ fn of_several_that_begin_at_once_one_is_the_first() {
 }
 
 #[test]
-fn a_folder_with_something_else_is_refused_and_left_alone() {
+fn a_folder_with_other_files_is_refused_and_unchanged() {
     let scratch = Scratch::new("stranger");
     fs::write(scratch.join("thesis.tex"), "years of work").unwrap();
     refused(open(scratch.path()), "thesis.tex");
@@ -81,7 +81,7 @@ fn a_folder_with_something_else_is_refused_and_left_alone() {
 }
 
 #[test]
-fn frames_with_a_lost_or_cut_or_changed_file_are_not_whole() {
+fn frames_with_a_missing_truncated_or_changed_file_are_incomplete() {
     let scratch = Scratch::new("damage");
     let dataset = open(scratch.path()).unwrap();
     write(&dataset, 0);
@@ -90,7 +90,7 @@ fn frames_with_a_lost_or_cut_or_changed_file_are_not_whole() {
     let mut count = 0;
     for (name, bytes) in of_frame {
         let path = scratch.join(name);
-        let whole = |check| dataset.whole(0, check).unwrap().is_some();
+        let whole = |check| dataset.complete_record(0, check).unwrap().is_some();
         assert!(whole(Check::Hashes));
         fs::remove_file(&path).unwrap();
         assert!(!whole(Check::Sizes), "{name} lost");
@@ -111,9 +111,9 @@ fn frames_with_a_lost_or_cut_or_changed_file_are_not_whole() {
 }
 
 #[test]
-fn inspection_says_what_is_there_and_what_is_not() {
+fn inspection_reports_present_and_missing_frames() {
     let scratch = Scratch::new("inspect");
-    assert!(inspect(scratch.path(), Check::Sizes).unwrap_err().to_string().contains("holds no data set"));
+    assert!(inspect(scratch.path(), Check::Sizes).unwrap_err().to_string().contains("contains no data set"));
     let dataset = open(scratch.path()).unwrap();
     assert_eq!(inspect(scratch.path(), Check::Sizes).unwrap().frames, 0);
     for index in [1, 2, 5, 6] {
@@ -124,14 +124,14 @@ fn inspection_says_what_is_there_and_what_is_not() {
     let overview = inspect(scratch.path(), Check::Hashes).unwrap();
     assert_eq!((overview.frames, overview.manifest.frames), (3, 4));
     assert_eq!(overview.missing, [0..1, 3..5, 6..7]);
-    assert_eq!(overview.defects[0].message, "objects/000006.csv is missing");
+    assert_eq!(overview.damaged_shards[0].to_string(), "objects/000006.csv: missing");
     assert_eq!(overview.objects.values().sum::<u64>(), 18);
     assert_eq!(overview.pixel_um, [0.25, 0.25]);
     assert_eq!(dataset.finish().unwrap().damaged, [6]);
 }
 
 #[test]
-fn what_killed_processes_left_is_swept_and_what_others_write_is_not() {
+fn temporary_files_of_killed_processes_are_removed_and_locked_ones_are_not() {
     let scratch = Scratch::new("sweep");
     let dataset = open(scratch.path()).unwrap();
     write(&dataset, 0);
@@ -141,7 +141,7 @@ fn what_killed_processes_left_is_swept_and_what_others_write_is_not() {
     held.lock().unwrap();
     open(scratch.path()).unwrap();
     assert!(!dead.exists() && alive.exists());
-    // Nor do they make a folder one that holds something else.
+    // A folder with only temporary files counts as empty.
     let other = Scratch::new("sweep-fresh");
     fs::write(other.join(".manifest.json.89ab.tmp"), "half").unwrap();
     open(other.path()).unwrap();
@@ -149,7 +149,7 @@ fn what_killed_processes_left_is_swept_and_what_others_write_is_not() {
 }
 
 #[test]
-fn a_lost_recipe_is_written_again() {
+fn a_missing_recipe_is_written_again() {
     let scratch = Scratch::new("recipe");
     open(scratch.path()).unwrap();
     let before = contents(scratch.path());
@@ -160,10 +160,10 @@ fn a_lost_recipe_is_written_again() {
 }
 
 #[test]
-fn a_file_in_the_way_is_an_error_that_trying_again_does_not_mend() {
+fn a_file_with_the_name_of_a_folder_is_not_an_io_error() {
     let scratch = Scratch::new("refusing");
     let dataset = open(scratch.path()).unwrap();
-    // A file where a folder is needed refuses everybody, also those who may do everything.
+    // This error does not depend on permissions.
     fs::write(scratch.join("labels"), "in the way").unwrap();
     let frame = frame(0, 1, 8, 1);
     let mut writer = dataset.shard_writer(0).unwrap();
@@ -172,11 +172,11 @@ fn a_file_in_the_way_is_an_error_that_trying_again_does_not_mend() {
     let error = writer.end(&frame.finished).unwrap_err();
     drop(writer);
     assert!(!error.is_io() && error.to_string().contains("labels/cytoplasm/000000.tif"), "{error}");
-    assert!(dataset.whole(0, Check::Sizes).unwrap().is_none());
+    assert!(dataset.complete_record(0, Check::Sizes).unwrap().is_none());
     assert!(contents(scratch.path()).iter().all(|(name, _)| !name.ends_with(".tmp")));
 }
 
-/// A small field of the engine.
+/// A recipe of small fields, and its engine.
 fn small() -> (Recipe, Engine) {
     let mut recipe = Preset::Sparse.recipe();
     recipe.field.width_px = 96.0.into();
@@ -189,17 +189,17 @@ fn small() -> (Recipe, Engine) {
 }
 
 #[test]
-fn runs_give_the_same_bytes_however_they_are_split() {
+fn the_bytes_do_not_depend_on_the_split_into_runs() {
     let (recipe, engine) = small();
     let model = Model::builtin();
     let (one, two) = (Scratch::new("split-1"), Scratch::new("split-2"));
     let stop = AtomicBool::new(false);
-    let run = |dataset: &Dataset, frames, at_once| {
+    let run = |dataset: &Dataset, frames, workers| {
         let seen = Mutex::new(Vec::new());
         let run = Run {
             frames,
-            share: Share::ALL,
-            at_once,
+            task: Task::ALL,
+            workers,
             threads: Threads::One,
             check: Check::Sizes,
             stop: &stop,
@@ -207,8 +207,8 @@ fn runs_give_the_same_bytes_however_they_are_split() {
         };
         let outcome = dataset.generate(&engine, &run, &|progress| {
             seen.lock().unwrap().push(match progress {
-                Progress::Kept(index) => (index, false),
-                Progress::Made(summary) => (summary.index, true),
+                Progress::Present(index) => (index, false),
+                Progress::Written(summary) => (summary.index, true),
             });
         });
         let mut seen = seen.into_inner().unwrap();
@@ -217,26 +217,26 @@ fn runs_give_the_same_bytes_however_they_are_split() {
     };
     let whole = open_with(one.path(), &recipe, &model, SEED).unwrap();
     let (outcome, _) = run(&whole, 0..4, 1);
-    assert_eq!(outcome, Outcome { kept: 0, made: 4, stopped: false });
+    assert_eq!(outcome, Outcome { present: 0, written: 4, stopped: false });
     whole.finish().unwrap();
 
     let parts = open_with(two.path(), &recipe, &model, SEED).unwrap();
     run(&parts, 2..3, 1);
     let (outcome, seen) = run(&parts, 0..4, 3);
-    assert_eq!(outcome, Outcome { kept: 1, made: 3, stopped: false });
+    assert_eq!(outcome, Outcome { present: 1, written: 3, stopped: false });
     assert_eq!(seen, [(0, true), (1, true), (2, false), (3, true)]);
     parts.finish().unwrap();
     assert_eq!(contents(one.path()), contents(two.path()));
 
     stop.store(true, Ordering::Relaxed);
     let (outcome, seen) = run(&parts, 0..u64::MAX, 2);
-    assert_eq!((outcome, seen), (Outcome { kept: 0, made: 0, stopped: true }, vec![]));
+    assert_eq!((outcome, seen), (Outcome { present: 0, written: 0, stopped: true }, vec![]));
     let other = Scratch::new("split-3");
     let stranger = open(other.path()).unwrap();
     let run = Run {
         frames: 0..1,
-        share: Share::ALL,
-        at_once: 1,
+        task: Task::ALL,
+        workers: 1,
         threads: Threads::One,
         check: Check::Sizes,
         stop: &AtomicBool::new(false),
@@ -246,15 +246,15 @@ fn runs_give_the_same_bytes_however_they_are_split() {
 }
 
 #[test]
-fn damage_that_keeps_the_size_is_found_and_mended() {
+fn damage_that_keeps_the_size_is_found_and_repaired() {
     let scratch = Scratch::new("mend");
     let (recipe, engine) = small();
     let dataset = open_with(scratch.path(), &recipe, &Model::builtin(), SEED).unwrap();
     let stop = AtomicBool::new(false);
     let run = |check| Run {
         frames: 0..2,
-        share: Share::ALL,
-        at_once: 1,
+        task: Task::ALL,
+        workers: 1,
         threads: Threads::One,
         check,
         stop: &stop,
@@ -272,21 +272,22 @@ fn damage_that_keeps_the_size_is_found_and_mended() {
         let middle = bytes.len() / 2;
         bytes[middle] ^= 1;
         fs::write(&path, bytes).unwrap();
-        // Of a file that the manifest names otherwise than it lies there, that file is missing.
+        // A file that the manifest lists under another name is missing.
         let findings = verify(scratch.path(), None).unwrap().findings;
         match name.as_str() {
             "manifest.json" => assert!(!findings.is_empty(), "{name}"),
             _ => assert!(findings.iter().any(|f| f.path == *name), "{name}: {findings:?}"),
         }
         let again = open_with(scratch.path(), &recipe, &Model::builtin(), SEED).unwrap();
-        let made = again.generate(&engine, &run(Check::Hashes), &|_| ()).unwrap().made;
+        let made = again.generate(&engine, &run(Check::Hashes), &|_| ()).unwrap().written;
         assert_eq!(made, u64::from(name.contains('/')), "{name}");
         again.finish().unwrap();
         assert!(contents(scratch.path()) == good, "{name} is mended, and nothing else is touched");
     }
     for name in ["coco.json", "recipe.toml"] {
         fs::remove_file(scratch.join(name)).unwrap();
-        assert_eq!(inspect(scratch.path(), Check::Sizes).unwrap().flaws, [format!("{name} is missing")]);
+        let damaged = inspect(scratch.path(), Check::Sizes).unwrap().damaged_files;
+        assert_eq!(damaged.iter().map(ToString::to_string).collect::<Vec<_>>(), [format!("{name}: missing")]);
         assert!(!dataset.is_finished().unwrap());
         open_with(scratch.path(), &recipe, &Model::builtin(), SEED).unwrap().finish().unwrap();
     }

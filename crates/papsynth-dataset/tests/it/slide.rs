@@ -1,4 +1,4 @@
-//! Slides on the disk: whoever makes them makes the same, nothing wrong goes unnoticed, and what is wrong is made again.
+//! Slides on the disk: reproducibility, verification and repair.
 
 #![cfg(feature = "zarr")]
 
@@ -11,7 +11,7 @@ use papsynth::recipe::{Preset, Recipe};
 use papsynth::truth::Group;
 use papsynth::{Engine, Inputs, Threads};
 use papsynth_dataset::slide::{SlideInfo, SlideRun, SlideSet};
-use papsynth_dataset::{Check, Cleaned, Mend, Share, clean};
+use papsynth_dataset::{Check, Cleaned, Fix, Task, clean};
 
 const SEED: u64 = 11;
 
@@ -42,14 +42,14 @@ fn info<'a>(recipe: &'a Recipe, model: &'a Model) -> SlideInfo<'a> {
     SlideInfo { recipe, model, seed: SEED, shard_px: 512, objects_parquet: cfg!(feature = "parquet") }
 }
 
-fn make(path: &Path, engine: &Engine, share: Share, check: Check) -> SlideSet {
+fn make(path: &Path, engine: &Engine, task: Task, check: Check) -> SlideSet {
     let slide = engine.slide(SEED, 0).unwrap();
     let (recipe, model) = (recipe(), Model::builtin());
     let info = info(&recipe, &model);
     let set = SlideSet::create_or_resume(path, &slide, &info).unwrap();
     let stop = AtomicBool::new(false);
-    let run = SlideRun { share, threads: Threads::All, check, stop: &stop };
-    assert!(!set.make(&slide, &run, &|_| ()).unwrap());
+    let run = SlideRun { task, threads: Threads::All, check, stop: &stop };
+    assert!(!set.generate(&slide, &run, &|_| ()).unwrap());
     set
 }
 
@@ -58,20 +58,20 @@ fn engine() -> Engine {
 }
 
 #[test]
-fn shares_make_the_same_slide_and_a_gap_is_no_slide() {
+fn tasks_generate_the_same_slide_and_missing_shards_are_refused() {
     let (one, two) = (Folder::new("one"), Folder::new("two"));
     let engine = engine();
-    let whole = make(&one.0, &engine, Share::ALL, Check::Sizes);
+    let whole = make(&one.0, &engine, Task::ALL, Check::Sizes);
     let root = whole.finish(Check::Sizes).unwrap();
-    make(&two.0, &engine, Share { index: 1, of: 2 }, Check::Sizes);
+    make(&two.0, &engine, Task { index: 1, total: 2 }, Check::Sizes);
     let half = SlideSet::open(&two.0).unwrap();
     let gap = half.finish(Check::Sizes).unwrap_err().to_string();
-    assert!(gap.contains("3 of 6 shards are missing or damaged") && gap.contains("0000-0000"), "{gap}");
-    make(&two.0, &engine, Share { index: 0, of: 2 }, Check::Sizes);
+    assert!(gap.contains("missing or damaged shards: 3 of 6") && gap.contains("0000-0000"), "{gap}");
+    make(&two.0, &engine, Task { index: 0, total: 2 }, Check::Sizes);
     assert_eq!(half.finish(Check::Sizes).unwrap(), root);
-    // What is read back is what the engine makes, in every level.
+    // The pixels of every level are those of the engine.
     let part = engine.slide(SEED, 0).unwrap().picture([100, 200], [900, 480], Threads::All).unwrap();
-    assert_eq!(whole.picture(0, 0, 200..680, 100..1000).unwrap(), part.planes[0].grey);
+    assert_eq!(whole.image(0, 0, 200..680, 100..1000).unwrap(), part.planes[0].grey);
     for (group, labels) in Group::ALL.into_iter().zip(&part.labels) {
         assert_eq!(whole.labels(group, 0, 200..680, 100..1000).unwrap(), labels.ids, "{}", group.name());
     }
@@ -80,8 +80,8 @@ fn shares_make_the_same_slide_and_a_gap_is_no_slide() {
         let [width, height] = whole.level_px(level).unwrap();
         let [below_width, below_height] = whole.level_px(level - 1).unwrap();
         let (found, below) = (
-            whole.picture(level, 0, 0..height, 0..width).unwrap(),
-            whole.picture(level - 1, 0, 0..below_height, 0..below_width).unwrap(),
+            whole.image(level, 0, 0..height, 0..width).unwrap(),
+            whole.image(level - 1, 0, 0..below_height, 0..below_width).unwrap(),
         );
         let at = |x: usize, y: usize| u32::from(below[y.min(below_height - 1) * below_width + x.min(below_width - 1)]);
         for (i, value) in found.iter().enumerate() {
@@ -90,18 +90,18 @@ fn shares_make_the_same_slide_and_a_gap_is_no_slide() {
             assert_eq!(u32::from(*value), mean, "{level}: {x} {y}");
         }
     }
-    // Another recipe does not go on here.
+    // Another recipe is refused.
     let mut other = recipe();
     other.scan.frame_px = 256;
     let model = Model::builtin();
     let info = info(&other, &model);
     let refused = SlideSet::create_or_resume(&one.0, &engine.slide(SEED, 0).unwrap(), &info).unwrap_err();
     let refused = refused.to_string();
-    assert!(refused.contains("another recipe (`scan.frame_px` is 512 there, 256 here)"), "{refused}");
+    assert!(refused.contains("another recipe (`scan.frame_px` is 512 there and 256 here)"), "{refused}");
 }
 
 #[test]
-fn of_two_that_begin_one_folder_at_once_with_different_seeds_one_goes_on() {
+fn of_two_processes_with_different_seeds_in_a_folder_one_succeeds() {
     let engine = engine();
     for round in 0..20 {
         let folder = Folder::new(&format!("begin-{round}"));
@@ -119,22 +119,22 @@ fn of_two_that_begin_one_folder_at_once_with_different_seeds_one_goes_on() {
 }
 
 #[test]
-fn what_asks_too_much_of_the_reach_begins_nothing() {
+fn too_large_objects_are_refused_before_a_file_is_written() {
     let folder = Folder::new("reach");
     let mut short = recipe();
-    short.scan.reach_um = 20.0;
+    short.scan.max_object_radius_um = 20.0;
     let model = Model::builtin();
     let engine = Engine::new(&short, &model, &Inputs::default()).unwrap();
     let refused = SlideSet::create_or_resume(&folder.0, &engine.slide(SEED, 0).unwrap(), &info(&short, &model));
     let refused = refused.unwrap_err().to_string();
-    assert!(refused.contains("scan.reach_um") && !folder.0.exists(), "{refused}");
+    assert!(refused.contains("scan.max_object_radius_um") && !folder.0.exists(), "{refused}");
 }
 
 #[test]
-fn whatever_is_wrong_is_found_and_mended() {
+fn every_damage_is_found_and_repaired() {
     let folder = Folder::new("wrong");
     let engine = engine();
-    let set = make(&folder.0, &engine, Share::ALL, Check::Sizes);
+    let set = make(&folder.0, &engine, Task::ALL, Check::Sizes);
     let root = set.finish(Check::Sizes).unwrap();
     assert_eq!(set.verify().unwrap(), []);
     let mut files = Vec::new();
@@ -151,7 +151,7 @@ fn whatever_is_wrong_is_found_and_mended() {
         let name = file.file_name().unwrap().to_string_lossy().into_owned();
         let bytes = fs::read(file).unwrap();
         let broken = |what: &str| {
-            // What a slide is cannot be found out without its head.
+            // A slide without its head cannot be opened.
             let found = match SlideSet::open(&folder.0) {
                 Ok(set) => set.verify().unwrap().len(),
                 Err(_) => usize::from(name == "slide.json"),
@@ -173,24 +173,24 @@ fn whatever_is_wrong_is_found_and_mended() {
     fs::write(folder.0.join("objects/other.csv"), "x").unwrap();
     fs::write(folder.0.join("objects/.0000-0000.csv.0123456789abcdef.tmp"), "x").unwrap();
     let found = set.verify().unwrap();
-    assert!(found.len() == 2 && found.iter().all(|finding| finding.mend == Mend::Clean), "{found:?}");
-    assert_eq!(clean(&folder.0, false).unwrap(), Cleaned { temporary: 1, strays: 0, stayed: 0 });
-    assert_eq!(clean(&folder.0, true).unwrap(), Cleaned { temporary: 0, strays: 1, stayed: 0 });
+    assert!(found.len() == 2 && found.iter().all(|finding| finding.fix == Fix::Clean), "{found:?}");
+    assert_eq!(clean(&folder.0, false).unwrap(), Cleaned { temporary: 1, untracked: 0, skipped: 0 });
+    assert_eq!(clean(&folder.0, true).unwrap(), Cleaned { temporary: 0, untracked: 1, skipped: 0 });
     assert_eq!(set.verify().unwrap(), []);
-    // What says the same in other bytes is not what was written.
+    // A reformatted record counts as changed.
     for name in ["shards/0000-0000.json", "upper.json"] {
         let mut bytes = fs::read(folder.0.join(name)).unwrap();
         bytes.push(b'\n');
         fs::write(folder.0.join(name), bytes).unwrap();
         let found = set.verify().unwrap();
-        assert!(found.len() == 1 && found[0].path == name && found[0].mend == Mend::Generate, "{found:?}");
-        make(&folder.0, &engine, Share::ALL, Check::Sizes).finish(Check::Sizes).unwrap();
+        assert!(found.len() == 1 && found[0].path == name && found[0].fix == Fix::Generate, "{found:?}");
+        make(&folder.0, &engine, Task::ALL, Check::Sizes).finish(Check::Sizes).unwrap();
         assert_eq!(set.verify().unwrap(), []);
     }
     let (slide, recipe_here, model) = (engine.slide(SEED, 0).unwrap(), recipe(), Model::builtin());
     let within = SlideSet::create_or_resume(&folder.0.join("objects/inner"), &slide, &info(&recipe_here, &model));
-    assert!(within.unwrap_err().to_string().contains("lies within"));
-    // What the slide is made from is made anew from the records, if they are of this slide.
+    assert!(within.unwrap_err().to_string().contains("is inside the data set or slide"));
+    // Inputs are restored if the records belong to this slide.
     let head = fs::read(folder.0.join("slide.json")).unwrap();
     for lost in [None, Some(&head[..head.len() / 2])] {
         match lost {
@@ -202,10 +202,10 @@ fn whatever_is_wrong_is_found_and_mended() {
         let other = SlideInfo { seed: SEED + 1, ..info(&recipe, &model) };
         let refused = SlideSet::create_or_resume(&folder.0, &slide, &other).unwrap_err().to_string();
         assert!(refused.contains("slide.json"), "{refused}");
-        make(&folder.0, &engine, Share::ALL, Check::Sizes);
+        make(&folder.0, &engine, Task::ALL, Check::Sizes);
         assert_eq!(set.verify().unwrap(), []);
     }
-    // Before it is closed, what is a stray cannot be told.
+    // Untracked files cannot be removed before the slide is finished.
     fs::remove_file(folder.0.join("upper.json")).unwrap();
     let refused = clean(&folder.0, true).unwrap_err().to_string();
     assert!(refused.contains("papsynth slide finalize"), "{refused}");
@@ -216,7 +216,7 @@ fn whatever_is_wrong_is_found_and_mended() {
     fs::write(shard, bytes).unwrap();
     let refused = set.finish(Check::Hashes).unwrap_err().to_string();
     assert!(refused.contains("1 of 6 shards"), "{refused}");
-    make(&folder.0, &engine, Share::ALL, Check::Hashes);
+    make(&folder.0, &engine, Task::ALL, Check::Hashes);
     assert_eq!(set.finish(Check::Sizes).unwrap(), root);
     assert!(set.is_finished().unwrap());
     assert_eq!(set.verify().unwrap(), []);

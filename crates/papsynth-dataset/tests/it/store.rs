@@ -1,4 +1,4 @@
-//! A data set in an object store is the one in a folder, whatever the store refuses on the way.
+//! Data sets in object stores are equal to those in folders, also after failures of the store.
 
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the numbers are small")]
 
@@ -11,21 +11,21 @@ use std::{fs, iter};
 use crate::support::{SEED, Scratch, contents, frame, recipe};
 use papsynth::model::Model;
 use papsynth_dataset::{
-    Check, Dataset, DatasetInfo, Error, Format, Home, Layout, Store, clean, shards_to_make, verify,
+    Check, Dataset, DatasetInfo, Error, Format, Layout, Location, Store, clean, missing_shards, verify,
 };
 
 const FRAMES: u64 = 5;
 
-/// A store in memory that refuses every call from one on.
+/// A store in memory that fails from a given call on.
 #[derive(Clone, Default)]
 struct Memory(Arc<Mutex<Inner>>);
 
 #[derive(Default)]
 struct Inner {
     files: BTreeMap<String, Vec<u8>>,
-    /// Calls that are still answered; none set, all are.
+    /// Number of calls that still succeed; `None`: all succeed.
     left: Option<usize>,
-    /// Names of what was put and removed, in order.
+    /// Names of uploaded and removed files, in order.
     log: Vec<String>,
 }
 
@@ -44,8 +44,8 @@ impl Memory {
         self.0.lock().unwrap().files.clone().into_iter().collect()
     }
 
-    fn home(&self) -> Home {
-        Home::in_store(self.clone()).unwrap()
+    fn home(&self) -> Location {
+        Location::in_store(self.clone()).unwrap()
     }
 }
 
@@ -91,12 +91,12 @@ fn layout(frames_per_shard: u64) -> Layout {
     Layout { frames_per_shard, ..Layout::new(Format::built()) }
 }
 
-/// Makes what is missing of a data set, stack and images, and merges it.
-fn make(home: impl Into<Home>, layout: &Layout) -> Result<Dataset, Error> {
+/// Generates the missing shards of a data set of a stack and images, and merges it.
+fn make(home: impl Into<Location>, layout: &Layout) -> Result<Dataset, Error> {
     let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout };
     let dataset = Dataset::create_or_resume(home, &info)?;
     for shard in 0..FRAMES.div_ceil(layout.frames_per_shard) {
-        if dataset.whole(shard, Check::Sizes)?.is_some() {
+        if dataset.complete_record(shard, Check::Sizes)?.is_some() {
             continue;
         }
         let mut writer = dataset.shard_writer(shard)?;
@@ -113,7 +113,7 @@ fn make(home: impl Into<Home>, layout: &Layout) -> Result<Dataset, Error> {
 }
 
 #[test]
-fn a_store_holds_what_a_folder_would() {
+fn a_store_has_the_same_files_as_a_folder() {
     for layout in [layout(1), layout(2)] {
         let (scratch, store) = (Scratch::new("store-same"), Memory::default());
         make(scratch.path(), &layout).unwrap();
@@ -134,7 +134,7 @@ fn a_store_holds_what_a_folder_would() {
 }
 
 #[test]
-fn a_record_is_put_after_the_files_it_vouches_for() {
+fn a_record_is_uploaded_after_the_files_that_it_lists() {
     let store = Memory::default();
     make(store.home(), &layout(2)).unwrap();
     let log = store.0.lock().unwrap().log.clone();
@@ -152,7 +152,7 @@ fn a_record_is_put_after_the_files_it_vouches_for() {
 }
 
 #[test]
-fn wherever_the_store_fails_nothing_is_partial_and_the_next_run_completes_it() {
+fn after_any_failure_of_the_store_no_file_is_partial_and_the_next_run_completes_it() {
     let good = Memory::default();
     let layout = Layout { frames_per_shard: 2, ..Layout::new([Format::Folder, Format::Webdataset]) };
     make(good.home(), &layout).unwrap();
@@ -178,31 +178,31 @@ fn wherever_the_store_fails_nothing_is_partial_and_the_next_run_completes_it() {
 }
 
 #[test]
-fn what_is_wrong_in_a_store_is_found_and_mended() {
+fn damage_in_a_store_is_found_and_repaired() {
     let store = Memory::default();
     let layout = Layout { frames_per_shard: 1, ..Layout::new([Format::Folder]) };
     make(store.home(), &layout).unwrap();
     let expected = store.files();
-    // Without a manifest it is no data set, as in a folder.
+    // As in a folder, there is no data set without a manifest.
     for (name, _) in expected.iter().filter(|(name, _)| name != "manifest.json") {
         store.0.lock().unwrap().files.remove(name);
-        let verdict = verify(store.home(), Some(0..FRAMES)).unwrap();
-        assert!(verdict.root.is_none() && !verdict.findings.is_empty(), "{name}");
+        let report = verify(store.home(), Some(0..FRAMES)).unwrap();
+        assert!(report.root.is_none() && !report.findings.is_empty(), "{name}");
         make(store.home(), &layout).unwrap();
         assert_eq!(store.files(), expected, "{name}");
     }
     store.0.lock().unwrap().files.insert("thesis.tex".to_owned(), b"years of work".to_vec());
     assert!(verify(store.home(), None).unwrap().findings.iter().any(|finding| finding.path == "thesis.tex"));
-    assert_eq!(clean(store.home(), true).unwrap().strays, 1);
+    assert_eq!(clean(store.home(), true).unwrap().untracked, 1);
     assert_eq!(store.files(), expected);
     let dataset = Dataset::open(store.home()).unwrap();
     let missing: Vec<u64> =
-        shards_to_make(&dataset, 0..FRAMES + 2, Check::Sizes).unwrap().into_iter().flatten().collect();
+        missing_shards(&dataset, 0..FRAMES + 2, Check::Sizes).unwrap().into_iter().flatten().collect();
     assert_eq!(missing, [FRAMES, FRAMES + 1]);
 }
 
 #[test]
-fn a_store_with_something_else_is_refused_and_left_alone() {
+fn a_store_with_other_files_is_refused_and_unchanged() {
     let store = Memory::default();
     store.0.lock().unwrap().files.insert("thesis.tex".to_owned(), Vec::new());
     let error = make(store.home(), &layout(1)).unwrap_err().to_string();

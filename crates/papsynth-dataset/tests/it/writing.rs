@@ -12,7 +12,7 @@ use papsynth::Frame;
 use papsynth::model::Model;
 use papsynth::truth::Group;
 use papsynth_dataset::read::{GreyImage, Limits, read_label_map};
-use papsynth_dataset::{Check, Dataset, DatasetInfo, FrameSummary, Layout, Picture, ShardRecord, rle};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, FrameSummary, Layout, RgbImage, ShardRecord, rle};
 use serde_json::Value;
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::tags::Tag;
@@ -77,9 +77,9 @@ fn a_single_plane_reads_back_in_8_and_in_12_bits() {
         assert!(matches!(&floats[..], [DecodingResult::F32(values)] if *values == frame.planes[0].noise_free));
         assert!(!scratch.join("all-in-focus").exists());
         check_labels(&scratch, &frame);
-        assert_eq!((summary.most_layers, summary.truncated, summary.saturated), (2, 1, vec![0]));
+        assert_eq!((summary.max_overlap, summary.truncated, summary.saturated_px), (2, 1, vec![0]));
         assert_eq!(summary.objects.values().sum::<u64>(), 6);
-        assert!(dataset.whole(3, Check::Hashes).unwrap().is_some());
+        assert!(dataset.complete_record(3, Check::Hashes).unwrap().is_some());
         let record = ShardRecord::from_json(&fs::read(scratch.join("shards/000003.json")).unwrap()).unwrap();
         assert_eq!(&record.identity, dataset.identity());
     }
@@ -104,7 +104,7 @@ fn a_stack_reads_back_plane_by_plane() {
         let scratch = Scratch::new(&format!("stack-{bits}"));
         let frame = frame(0, 4, bits, 1);
         let summary = write(&open(&scratch), &frame);
-        assert_eq!(summary.saturated, [0, 1, 2, 3]);
+        assert_eq!(summary.saturated_px, [0, 1, 2, 3]);
         let (planes, description) = pages(&scratch, "images/000000.ome.tif");
         for (plane, page) in frame.planes.iter().zip(&planes) {
             let read: Vec<u16> = match page {
@@ -142,7 +142,7 @@ fn colours_read_back() {
         let scratch = Scratch::new(&format!("colour-{planes}-{bits}"));
         let frame = colour_frame(0, planes, bits);
         let summary = write(&open(&scratch), &frame);
-        assert_eq!((summary.channels, summary.saturated.len()), (3, planes));
+        assert_eq!((summary.channels, summary.saturated_px.len()), (3, planes));
         let (floats, _) = pages(&scratch, "noise-free/000000.tif");
         for (plane, page) in frame.planes.iter().zip(floats) {
             assert!(matches!(page, DecodingResult::F32(values) if values == plane.noise_free));
@@ -200,7 +200,7 @@ fn truth_is_the_same_in_masks_tables_and_labels() {
             rle::decode(rle["counts"].as_str().unwrap(), WIDTH, HEIGHT).unwrap()
         };
         assert_eq!(mask("segmentation"), object.amodal);
-        assert_eq!(mask("front"), object.front);
+        assert_eq!(mask("visible"), object.visible);
         let category = coco["categories"].as_array().unwrap().iter().find(|c| c["id"] == annotation["category_id"]);
         assert_eq!(category.unwrap()["supercategory"], object.group().name());
     }
@@ -218,7 +218,7 @@ fn truth_is_the_same_in_masks_tables_and_labels() {
         assert_eq!(get(i, "image"), if i < 6 { "0" } else { "2" });
         assert_eq!(get(i, "id"), object.id.to_string());
         assert_eq!(get(i, "area_px"), object.amodal.area().to_string());
-        assert_eq!(get(i, "front_area_px"), object.front.area().to_string());
+        assert_eq!(get(i, "visible_area_px"), object.visible.area().to_string());
         assert_eq!(get(i, "traits"), object.traits.to_string());
         assert_eq!(get(i, "truncated"), object.truncated.to_string());
         assert_eq!(get(i, "depth_um").parse(), Ok(object.depth_um));
@@ -281,7 +281,7 @@ fn bytes_depend_neither_on_order_nor_on_repetition() {
 #[test]
 fn pictures_show_every_object() {
     let frame = frame(0, 1, 8, 1);
-    let picture = Picture::overlay(&frame.planes[0], &frame.finished);
+    let picture = RgbImage::overlay(&frame.planes[0], &frame.finished);
     assert_eq!(picture.rgb.len(), WIDTH * HEIGHT * 3);
     let is_grey =
         |at: usize| picture.rgb[at * 3] == picture.rgb[at * 3 + 1] && picture.rgb[at * 3] == picture.rgb[at * 3 + 2];
@@ -345,7 +345,7 @@ fn what_does_not_fit_together_is_refused_and_leaves_no_frame() {
     refused(dataset.shard_writer(0).unwrap().begin(&scene).unwrap_err(), "0 planes");
     refused(dataset.shard_writer(1).unwrap().begin(&good.finished.scene).unwrap_err(), "shard 1 has the frames 1 to 1");
     refused(begin().commit().unwrap_err(), "is not finished");
-    assert!(dataset.whole(0, Check::Sizes).unwrap().is_none());
+    assert!(dataset.complete_record(0, Check::Sizes).unwrap().is_none());
     assert_eq!(dataset.finish().unwrap().frames, 0);
     assert!(contents(scratch.path()).iter().all(|(name, _)| !name.ends_with(".tmp")));
 }

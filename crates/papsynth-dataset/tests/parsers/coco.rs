@@ -8,7 +8,7 @@ pub(crate) fn check(bytes: &[u8]) {
         return;
     };
     for (_, truth) in truths {
-        for mask in truth.objects.iter().flat_map(|object| [&object.amodal, &object.front]) {
+        for mask in truth.objects.iter().flat_map(|object| [&object.amodal, &object.visible]) {
             assert!(mask.runs().iter().all(|run| (run.x1 as usize) <= truth.width && (run.y as usize) < truth.height));
         }
     }

@@ -74,7 +74,7 @@ impl Shard {
         record.sha256 = sha256(&serde_json::to_vec(&record).expect("a record is JSON"));
         fs::write(scratch.join(path), content).expect("a file");
         fs::write(scratch.join(RECORD), serde_json::to_vec(&record).expect("a record is JSON")).expect("a record");
-        let found = dataset.whole(0, Check::Hashes).expect("no failure of the system");
+        let found = dataset.complete_record(0, Check::Hashes).expect("no failure of the system");
         fs::write(scratch.join(path), good).expect("a file");
         found.is_some()
     }

@@ -11,7 +11,7 @@ use papsynth::scene::{
     Kind, Restoration, Scene, SceneBackground, SceneCamera, SceneDyes, SceneIllumination, SceneLight, SceneOptics,
     Tint, View,
 };
-use papsynth::truth::{Group, Mask, ObjectTruth, Part, Run, Trait, Truth, front_masks};
+use papsynth::truth::{Group, Mask, ObjectTruth, Part, Run, Trait, Truth, visible_masks};
 use papsynth::{Finished, Frame, Plane};
 
 pub(crate) const WIDTH: usize = 70;
@@ -85,8 +85,8 @@ pub(crate) fn scene(index: u64, planes: usize, bits: u32) -> Scene {
         background: SceneBackground {
             level: 0.9,
             illumination: SceneIllumination::Border { exponent: 0.02 },
-            scatter: 0.01,
-            scatter_um: 60.0,
+            texture: 0.01,
+            texture_um: 60.0,
         },
         light: SceneLight::Monochrome { wavelength_um: 0.57, bandwidth_um: 0.01 },
         optics: SceneOptics::Gaussian { sigma_xy_um: 0.225, sigma_z_um_per_um: 0.25 },
@@ -98,7 +98,7 @@ pub(crate) fn scene(index: u64, planes: usize, bits: u32) -> Scene {
             read_noise_e: 8.0,
             read_noise_rms_e: 0.0,
             offset_dn: 0.0,
-            glare_removed: 0.0,
+            glare_subtracted: 0.0,
             photon_noise: PhotonNoise::Exact,
             prnu: 0.0,
             dsnu_e: 0.0,
@@ -113,7 +113,7 @@ pub(crate) fn scene(index: u64, planes: usize, bits: u32) -> Scene {
             binning_px: 1,
             binning: Binning::Charge,
             jpeg_quality: 0,
-            jpeg_subsampling: Subsampling::Squares,
+            jpeg_subsampling: Subsampling::S420,
         },
         frame: None,
         objects: Vec::new(),
@@ -184,9 +184,9 @@ fn frame_of(scene: Scene, first_id: u32) -> Frame {
     for part in [Part::Cytoplasm, Part::Nucleus, Part::Whole] {
         let members = of_part(&objects, part);
         let stack: Vec<_> = members.iter().map(|&i| (objects[i].id, objects[i].depth_um, &objects[i].amodal)).collect();
-        let fronts = front_masks(&stack, WIDTH, HEIGHT);
+        let fronts = visible_masks(&stack, WIDTH, HEIGHT);
         for (i, front) in members.into_iter().zip(fronts) {
-            objects[i].front = front;
+            objects[i].visible = front;
         }
     }
     let truth = Truth { width: WIDTH, height: HEIGHT, objects };

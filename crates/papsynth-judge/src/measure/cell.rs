@@ -7,7 +7,7 @@ use super::maps::{Maps, width_at};
 use crate::number::{nearest, whole};
 use crate::region::{Region, Shape, components, distance, smoothed};
 use crate::statistics::{deviation, mean, of_sorted, sorted};
-use crate::table::{Family, Row};
+use crate::table::{FeatureKind, Row};
 
 /// Darker than this is a cell, absorbance after a Gaussian of 1 pixel.
 pub(crate) const COVERED: f32 = 0.03;
@@ -116,55 +116,55 @@ impl<'a> Cell<'a> {
         let um2 = pixel_um * pixel_um;
         let shape = self.shape;
         let radius = (shape.area / PI).sqrt();
-        row.put(Family::Shape, "cell area, um2", shape.area * um2);
-        row.put(Family::Shape, "cell eccentricity", shape.eccentricity);
-        row.put(Family::Shape, "cell solidity", shape.solidity);
-        row.put(Family::Shape, "cell circularity", shape.circularity);
-        row.put(Family::Shape, "corners", self.outline.corners);
-        row.put(Family::Shape, "notches", self.outline.notches);
-        row.put(Family::Shape, "straight part of the outline", self.outline.straight);
+        row.put(FeatureKind::Shape, "cell area, um2", shape.area * um2);
+        row.put(FeatureKind::Shape, "cell eccentricity", shape.eccentricity);
+        row.put(FeatureKind::Shape, "cell solidity", shape.solidity);
+        row.put(FeatureKind::Shape, "cell circularity", shape.circularity);
+        row.put(FeatureKind::Shape, "corners", self.outline.corners);
+        row.put(FeatureKind::Shape, "notches", self.outline.notches);
+        row.put(FeatureKind::Shape, "straight part of the outline", self.outline.straight);
         let nucleus = self.nucleus.shape();
-        row.put(Family::Shape, "nucleus over cell area", nucleus.area / shape.area);
-        row.put(Family::Shape, "nucleus off centre, radii", distance(nucleus.centre, shape.centre) / radius);
+        row.put(FeatureKind::Shape, "nucleus over cell area", nucleus.area / shape.area);
+        row.put(FeatureKind::Shape, "nucleus off centre, radii", distance(nucleus.centre, shape.centre) / radius);
 
         let middle = self.middle();
         let unit = middle.max(0.01);
         let at = |q: f64| of_sorted(&self.sorted, q) / unit;
-        row.put(Family::Stain, "cytoplasm absorbance", middle);
-        row.put(Family::Stain, "cytoplasm sd over median", deviation(&self.sorted) / unit);
+        row.put(FeatureKind::Absorbance, "cytoplasm absorbance", middle);
+        row.put(FeatureKind::Absorbance, "cytoplasm sd over median", deviation(&self.sorted) / unit);
         for q in [0.05, 0.25, 0.75, 0.9, 0.99] {
-            row.put(Family::Stain, format!("cytoplasm quantile {q} over median"), at(q));
+            row.put(FeatureKind::Absorbance, format!("cytoplasm quantile {q} over median"), at(q));
         }
         for (i, a) in self.profile(maps).into_iter().enumerate() {
-            row.put(Family::Stain, format!("rim to centre, bin {} of {PROFILE}", i + 1), a);
+            row.put(FeatureKind::Absorbance, format!("rim to centre, bin {} of {PROFILE}", i + 1), a);
         }
 
         let pixels = || self.cytoplasm.iter().map(|c| c.0);
         for (band, name) in ["1", "2", "4", "8", "16"].into_iter().enumerate() {
             let power = maps.power(pixels(), band) / unit;
-            row.put(Family::Texture, format!("cytoplasm power at {name} px over median"), power);
+            row.put(FeatureKind::Texture, format!("cytoplasm power at {name} px over median"), power);
         }
         let inner = || self.cytoplasm.iter().filter(|c| c.1 > 0.2).map(|c| c.0);
         let slopes: Vec<f64> = inner().map(|p| f64::from(maps.slope[p])).collect();
-        row.put(Family::Texture, "cytoplasm slope over median", mean(&slopes) / unit);
+        row.put(FeatureKind::Texture, "cytoplasm slope over median", mean(&slopes) / unit);
         let [dark, pale] = maps.extrema(inner());
-        row.put(Family::Texture, "dark spots in cytoplasm, um-2", dark / um2);
-        row.put(Family::Texture, "pale spots in cytoplasm, um-2", pale / um2);
+        row.put(FeatureKind::Texture, "dark spots in cytoplasm, um-2", dark / um2);
+        row.put(FeatureKind::Texture, "pale spots in cytoplasm, um-2", pale / um2);
         let of_sector = |s: usize| {
             let own = pixels().filter(|p| self.sector(*p, maps.width) == s);
             super::mean_of(own.map(|p| f64::from(maps.absorbance[p]))) / unit
         };
         let sectors: Vec<f64> = (0..SECTORS).map(of_sector).filter(|v| v.is_finite()).collect();
-        row.put(Family::Texture, "unevenness between sectors", deviation(&sectors));
-        row.put(Family::Texture, "darkest sector over median", sectors.iter().copied().fold(f64::NAN, f64::max));
+        row.put(FeatureKind::Texture, "unevenness between sectors", deviation(&sectors));
+        row.put(FeatureKind::Texture, "darkest sector over median", sectors.iter().copied().fold(f64::NAN, f64::max));
 
         let near = self.rim();
         let rim = sorted(maps.edges.iter().filter(|e| near.binary_search(&e.pixel).is_ok()).map(|e| e.sigma));
         for q in [0.25, 0.5] {
             let name = format!("sigma of the cell's rim, px, quantile {q}");
-            row.put(Family::Edges, name, width_at(&rim, q));
+            row.put(FeatureKind::Edges, name, width_at(&rim, q));
         }
-        row.put(Family::Edges, "steep part of the rim", rim.len() as f64 / (TAU * radius));
+        row.put(FeatureKind::Edges, "steep part of the rim", rim.len() as f64 / (TAU * radius));
         row
     }
 
@@ -257,7 +257,8 @@ mod tests {
             // The camera has whole levels of grey, and the outermost bin some of the slide.
             assert!((value - wanted).abs() < if i == 0 { 0.12 } else { 0.04 }, "{i}: {value}, not {wanted}");
         }
-        let table: crate::table::Table = std::iter::once((cell.features(&maps, PIXEL_UM), cell.shape.centre)).collect();
+        let table: crate::table::FeatureTable =
+            std::iter::once((cell.features(&maps, PIXEL_UM), cell.shape.centre)).collect();
         let value = |name: &str| table.column(name).next().unwrap();
         assert!((value("nucleus off centre, radii") - 0.1).abs() < 0.02);
         assert!((value("nucleus over cell area") - 1.0 / 49.0).abs() < 0.002);

@@ -2,7 +2,7 @@
 
 use crate::background::Background;
 use crate::filter::{blur, gradient, halved, slope};
-use crate::picture::Picture;
+use crate::image::FieldImage;
 use crate::statistics::of_sorted;
 
 /// A picture and what several measurements need of it.
@@ -28,7 +28,7 @@ pub(crate) struct Maps {
 pub(crate) const BANDS: usize = 6;
 
 impl Maps {
-    pub(crate) fn new(picture: &Picture) -> Self {
+    pub(crate) fn new(picture: &FieldImage) -> Self {
         let width = picture.width;
         let background = Background::new(&picture.grey, width, picture.full_scale);
         let absorbance = background.absorbance(&picture.grey, picture.full_scale);
@@ -164,7 +164,7 @@ mod tests {
         /// Of a light at each column and row.
         pub(crate) fn drawn(width: usize, height: usize, light: impl Fn(f64, f64) -> f64) -> Self {
             let at = |i: usize| crate::number::single(light((i % width) as f64, (i / width) as f64));
-            Self::new(&Picture { grey: (0..width * height).map(at).collect(), width, ..Picture::default() })
+            Self::new(&FieldImage { grey: (0..width * height).map(at).collect(), width, ..FieldImage::default() })
         }
     }
 

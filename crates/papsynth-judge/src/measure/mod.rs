@@ -1,4 +1,4 @@
-//! From a picture to numbers.
+//! Measurements of field images.
 
 mod cell;
 mod maps;
@@ -7,14 +7,16 @@ mod nucleus;
 mod patch;
 mod statistics;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use crate::control::Control;
 use crate::error::Error;
+use crate::image::{FieldImage, NucleiAnnotation};
 use crate::nuclei::{NucleiParams, nuclei};
 use crate::number::nearest;
-use crate::picture::{Known, Picture};
 use crate::region::Region;
-use crate::table::Table;
+use crate::table::FeatureTable;
 use maps::Maps;
 
 pub use cell::PROFILE;
@@ -23,24 +25,24 @@ pub use statistics::{
     HISTOGRAM, HISTOGRAM_FROM, HISTOGRAM_STEP, Named, RADII_UM, Statistics, clark_evans, frequencies, ripley,
 };
 
-/// Which knowledge of nuclei is used: what both sides have.
+/// Source of the nuclei, the same for both sides of a comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, Default)]
 #[serde(rename_all = "kebab-case")]
 pub enum NucleiFrom {
-    /// Nothing: nuclei are found.
+    /// Segmentation of the image.
     #[default]
     Search,
-    /// Points: the darkest compact thing around each. Where a picture brings masks, their centres are the points.
+    /// Segmentation of the darkest compact object around each annotated point, or around the centre of each mask.
     Points,
-    /// The masks that pictures bring.
+    /// Annotated masks.
     Masks,
 }
 
 impl NucleiFrom {
-    /// All of them, from the least to the most that is known.
+    /// All sources, from the least to the most annotation.
     pub const ALL: [Self; 3] = [Self::Search, Self::Points, Self::Masks];
 
-    /// What it is called.
+    /// Returns the name.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -50,84 +52,86 @@ impl NucleiFrom {
         }
     }
 
-    /// The most that a picture allows.
+    /// Returns the source that uses an annotation best.
     #[must_use]
-    pub fn of(known: &Known) -> Self {
-        match known {
-            Known::Nothing => Self::Search,
-            Known::Points(_) => Self::Points,
-            Known::Masks(_) => Self::Masks,
+    pub fn of(annotation: &NucleiAnnotation) -> Self {
+        match annotation {
+            NucleiAnnotation::None => Self::Search,
+            NucleiAnnotation::Points(_) => Self::Points,
+            NucleiAnnotation::Masks(_) => Self::Masks,
         }
     }
 }
 
-/// How much is measured.
+/// Extent of the measurements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
 #[serde(rename_all = "kebab-case")]
 pub enum Detail {
-    /// The field as a whole, nuclei and free cells.
+    /// Field statistics, nuclei and free cells.
     Statistics,
-    /// Patches too, which takes about twice as long, and a copy of the picture for reports.
+    /// Also patches, which doubles the time, and a copy of the image for reports.
     #[default]
     Everything,
 }
 
-/// How pictures are measured: both sides the same.
+/// Parameters of the measurements, the same for both sides of a comparison.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct GaugeParams {
-    /// Size of a pixel of every picture in the object, µm, 0.02 to 10. Default 0.33: that of a 20x objective.
+pub struct MeasurerParams {
+    /// Pixel size in the object plane, µm, 0.02 to 10. Default 0.33, for a 20x objective.
     pub pixel_um: f64,
-    /// Where nuclei are known from. Default: nowhere, they are found.
+    /// Source of the nuclei. Default: segmentation.
     pub nuclei_from: NucleiFrom,
-    /// What is taken for a nucleus.
+    /// Parameters of the segmentation of nuclei.
     pub nuclei: NucleiParams,
-    /// How much is measured. Default: everything.
+    /// Extent of the measurements. Default: everything.
     pub detail: Detail,
 }
 
-impl Default for GaugeParams {
+impl Default for MeasurerParams {
     fn default() -> Self {
         let (nuclei_from, detail) = (NucleiFrom::default(), Detail::default());
         Self { pixel_um: 0.33, nuclei_from, nuclei: NucleiParams::default(), detail }
     }
 }
 
-/// Measures pictures, all alike.
+/// Measures field images with one set of parameters.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Gauge {
-    params: GaugeParams,
+pub struct Measurer {
+    params: MeasurerParams,
 }
 
-/// A picture in numbers.
+/// Measurements of an image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
-    /// The picture's name.
+    /// Name of the image.
     pub name: String,
-    /// The picture's group.
+    /// Group of the image.
     pub group: String,
-    /// Columns, without dead borders.
+    /// Columns, without black borders.
     pub width: usize,
-    /// Rows.
+    /// Rows, without black borders.
     pub height: usize,
-    /// The field as a whole.
+    /// Statistics of the complete field.
     pub statistics: Statistics,
-    /// Its nuclei that do not touch the border.
-    pub nuclei: Table,
-    /// Its free cells with one nucleus.
-    pub cells: Table,
-    /// Its patches of 200 x 200 pixels; none at [`Detail::Statistics`].
-    pub patches: Table,
-    /// The picture in 8 bits, for reports; nothing at [`Detail::Statistics`].
+    /// Nuclei that do not touch the border.
+    pub nuclei: FeatureTable,
+    /// Free cells with one nucleus.
+    pub cells: FeatureTable,
+    /// Patches of 200 x 200 pixels; none with [`Detail::Statistics`].
+    pub patches: FeatureTable,
+    /// The image in 8 bits, for reports; empty with [`Detail::Statistics`].
     pub(crate) thumbnail: Vec<u8>,
-    pub(crate) params: GaugeParams,
+    /// Hash of the grey levels: equal for equal images.
+    pub(crate) fingerprint: u64,
+    pub(crate) params: MeasurerParams,
 }
 
-impl Gauge {
+impl Measurer {
     /// Checks the parameters.
     ///
     /// # Errors
-    /// If one is outside its range.
-    pub fn new(params: &GaugeParams) -> Result<Self, Error> {
+    /// If a parameter is out of range.
+    pub fn new(params: &MeasurerParams) -> Result<Self, Error> {
         let n = &params.nuclei;
         Error::check(&[
             ("pixel_um", params.pixel_um, [0.02, 10.0], "0.02 to 10 um"),
@@ -141,58 +145,109 @@ impl Gauge {
         Ok(Self { params: params.clone() })
     }
 
-    /// Measures a picture.
+    /// Measures an image.
     ///
     /// # Errors
-    /// If it is no picture: too small, the same everywhere, or with grey levels outside its scale.
-    pub fn measure(&self, picture: &Picture) -> Result<Field, Error> {
-        picture.check()?;
-        let picture = picture.trimmed();
-        // What is left of it may be too little.
-        picture.check()?;
+    /// If the image is too small or constant, or has grey levels outside its scale.
+    pub fn measure(&self, image: &FieldImage) -> Result<Field, Error> {
+        self.measure_with(image, &Control::NONE)
+    }
+
+    /// As [`measure`](Self::measure), with a stop flag. It reports no progress.
+    ///
+    /// # Errors
+    /// As `measure`; [`Error::Stopped`] if the stop flag is set.
+    pub fn measure_with(&self, image: &FieldImage, control: &Control) -> Result<Field, Error> {
+        control.check()?;
+        image.check()?;
+        let image = image.trimmed();
+        // The trimmed image may be too small.
+        image.check()?;
         let pixel_um = self.params.pixel_um;
-        let maps = Maps::new(&picture);
-        let regions = self.nuclei(&maps, &picture.nuclei);
+        let maps = Maps::new(&image);
+        control.check()?;
+        let regions = self.nuclei(&maps, &image.nuclei);
+        control.check()?;
         let ids = ids(&maps, &regions);
         let cells = cell::cells(&maps, &ids, &regions, pixel_um);
         let free = regions.iter().filter(|r| !r.at_border());
-        let of_nuclei = free.map(|r| (nucleus::features(&maps, r, &ids, pixel_um), r.shape().centre));
-        let of_cells = cells.iter().map(|cell| (cell.features(&maps, pixel_um), cell.shape.centre));
+        let of_nuclei = free.map(|r| {
+            control.check()?;
+            Ok((nucleus::features(&maps, r, &ids, pixel_um), r.shape().centre))
+        });
+        let of_nuclei = of_nuclei.collect::<Result<_, Error>>()?;
+        let of_cells = cells.iter().map(|cell| {
+            control.check()?;
+            Ok((cell.features(&maps, pixel_um), cell.shape.centre))
+        });
+        let of_cells = of_cells.collect::<Result<_, Error>>()?;
         let (patches, thumbnail) = match self.params.detail {
-            Detail::Statistics => (Table::default(), Vec::new()),
+            Detail::Statistics => (FeatureTable::default(), Vec::new()),
             Detail::Everything => {
                 let in_8_bits = maps.grey.iter().map(|g| u8::try_from(nearest(f64::from(*g))).unwrap_or(u8::MAX));
-                (patch::patches(&maps), in_8_bits.collect())
+                (patch::patches(&maps, control)?, in_8_bits.collect())
             }
         };
         Ok(Field {
-            name: picture.name.clone(),
-            group: picture.group.clone(),
+            name: image.name.clone(),
+            group: image.group.clone(),
             width: maps.width,
             height: maps.height,
             statistics: Statistics::new(&maps, &ids, &regions, &cells, pixel_um),
-            nuclei: of_nuclei.collect(),
-            cells: of_cells.collect(),
+            nuclei: of_nuclei,
+            cells: of_cells,
             patches,
             thumbnail,
+            fingerprint: fingerprint(&image),
             params: self.params.clone(),
         })
     }
 
-    fn nuclei(&self, maps: &Maps, known: &Known) -> Vec<Region> {
-        let search =
-            |known: &Known| nuclei(&maps.absorbance, maps.width, self.params.pixel_um, known, &self.params.nuclei);
-        match (self.params.nuclei_from, known) {
-            (NucleiFrom::Masks, Known::Masks(_)) | (NucleiFrom::Points, Known::Points(_)) => search(known),
-            (NucleiFrom::Points, Known::Masks(_)) => {
-                search(&Known::Points(search(known).iter().map(|r| r.shape().centre).collect()))
+    /// Measures several images in parallel. `read` returns the image of an item, so that not all images are in memory at once. The
+    /// phase of the progress reports is "measuring fields".
+    ///
+    /// # Errors
+    /// The first error of `read` or of [`measure_with`](Self::measure_with), in the order of the items.
+    pub fn measure_all<T: Sync, E: From<Error> + Send>(
+        &self,
+        items: &[T],
+        read: impl Fn(&T) -> Result<FieldImage, E> + Sync,
+        control: &Control,
+    ) -> Result<Vec<Field>, E> {
+        let phase = control.phase("measuring fields", items.len());
+        let measure = |item: &T| -> Result<Field, E> {
+            control.check()?;
+            let field = self.measure_with(&read(item)?, control)?;
+            phase.step()?;
+            Ok(field)
+        };
+        let fields: Vec<Result<Field, E>> = items.par_iter().map(measure).collect();
+        fields.into_iter().collect()
+    }
+
+    fn nuclei(&self, maps: &Maps, annotation: &NucleiAnnotation) -> Vec<Region> {
+        let search = |annotation: &NucleiAnnotation| {
+            nuclei(&maps.absorbance, maps.width, self.params.pixel_um, annotation, &self.params.nuclei)
+        };
+        match (self.params.nuclei_from, annotation) {
+            (NucleiFrom::Masks, NucleiAnnotation::Masks(_)) | (NucleiFrom::Points, NucleiAnnotation::Points(_)) => {
+                search(annotation)
             }
-            _ => search(&Known::Nothing),
+            (NucleiFrom::Points, NucleiAnnotation::Masks(_)) => {
+                search(&NucleiAnnotation::Points(search(annotation).iter().map(|r| r.shape().centre).collect()))
+            }
+            _ => search(&NucleiAnnotation::None),
         }
     }
 }
 
-/// In every pixel the number of its region from 1 on, or 0.
+/// Returns a hash of the grey levels (FNV-1a).
+fn fingerprint(image: &FieldImage) -> u64 {
+    let words = [image.width as u64].into_iter().chain(image.grey.iter().map(|g| u64::from(g.to_bits())));
+    words.fold(0xcbf2_9ce4_8422_2325, |hash, word| (hash ^ word).wrapping_mul(0x0100_0000_01b3))
+}
+
+/// Returns the number of the region of each pixel, from 1; 0 outside all regions.
 fn ids(maps: &Maps, regions: &[Region]) -> Vec<u32> {
     let mut ids = vec![0; maps.absorbance.len()];
     for (id, region) in (1..).zip(regions) {
@@ -201,7 +256,7 @@ fn ids(maps: &Maps, regions: &[Region]) -> Vec<u32> {
     ids
 }
 
-/// The mean; NaN of nothing.
+/// Returns the mean; NaN of no values.
 fn mean_of(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0_usize), |(s, n), v| (s + v, n + 1));
     if count == 0 { f64::NAN } else { sum / count as f64 }

@@ -10,7 +10,7 @@ use crate::moments::{DESCRIPTORS, descriptors};
 use crate::number::{nearest, whole};
 use crate::region::Region;
 use crate::statistics::{deviation, mean, median, of_sorted, sorted};
-use crate::table::{Family, Row};
+use crate::table::{FeatureKind, Row};
 
 /// The rim, which is blurred, is left out of the core: pixels.
 pub(crate) const RIM_PX: f64 = 2.0;
@@ -63,47 +63,51 @@ pub(crate) fn features(maps: &Maps, region: &Region, ids: &[u32], pixel_um: f64)
     let mut row = Row::default();
 
     let um2 = pixel_um * pixel_um;
-    row.put(Family::Shape, "nucleus area, um2", shape.area * um2);
-    row.put(Family::Shape, "nucleus eccentricity", shape.eccentricity);
-    row.put(Family::Shape, "nucleus solidity", shape.solidity);
-    row.put(Family::Shape, "nucleus circularity", shape.circularity);
-    row.put(Family::Shape, "nucleus outline roughness", roughness(region, &shape));
+    row.put(FeatureKind::Shape, "nucleus area, um2", shape.area * um2);
+    row.put(FeatureKind::Shape, "nucleus eccentricity", shape.eccentricity);
+    row.put(FeatureKind::Shape, "nucleus solidity", shape.solidity);
+    row.put(FeatureKind::Shape, "nucleus circularity", shape.circularity);
+    row.put(FeatureKind::Shape, "nucleus outline roughness", roughness(region, &shape));
 
-    row.put(Family::Stain, "core absorbance", inner);
-    row.put(Family::Stain, "core above surroundings", contrast);
-    row.put(Family::Surroundings, "absorbance beside", outer);
-    row.put(Family::Surroundings, "absorbance further out less beside", mean(&beyond) - mean(&beside));
-    row.put(Family::Surroundings, "spread beside", deviation(&beside));
+    row.put(FeatureKind::Absorbance, "core absorbance", inner);
+    row.put(FeatureKind::Absorbance, "core above surroundings", contrast);
+    row.put(FeatureKind::Surroundings, "absorbance beside", outer);
+    row.put(FeatureKind::Surroundings, "absorbance further out less beside", mean(&beyond) - mean(&beside));
+    row.put(FeatureKind::Surroundings, "spread beside", deviation(&beside));
     let beside_of = |s: usize| mean_of(ring(BESIDE_UM).filter(|p| p.sector == s).map(|p| p.a));
-    row.put(Family::Surroundings, "unevenness around", deviation(&known((0..SECTORS).map(beside_of))));
+    row.put(FeatureKind::Surroundings, "unevenness around", deviation(&known((0..SECTORS).map(beside_of))));
 
-    row.put(Family::Texture, "core sd", sd);
-    row.put(Family::Texture, "core sd over contrast", sd / contrast.max(0.02));
-    row.put(Family::Texture, "core skewness", standard_moment(&core_a, inner, sd, 3));
-    row.put(Family::Texture, "core kurtosis", standard_moment(&core_a, inner, sd, 4));
-    row.put(Family::Texture, "core dark tail", (of_sorted(&core_a, 0.95) - middle) / sd.max(1e-3));
-    row.put(Family::Texture, "core pale tail", (middle - of_sorted(&core_a, 0.05)) / sd.max(1e-3));
+    row.put(FeatureKind::Texture, "core sd", sd);
+    row.put(FeatureKind::Texture, "core sd over contrast", sd / contrast.max(0.02));
+    row.put(FeatureKind::Texture, "core skewness", standard_moment(&core_a, inner, sd, 3));
+    row.put(FeatureKind::Texture, "core kurtosis", standard_moment(&core_a, inner, sd, 4));
+    row.put(FeatureKind::Texture, "core dark tail", (of_sorted(&core_a, 0.95) - middle) / sd.max(1e-3));
+    row.put(FeatureKind::Texture, "core pale tail", (middle - of_sorted(&core_a, 0.05)) / sd.max(1e-3));
 
     // From the rim to the centre, against the surroundings and the core.
     for bin in 0..BINS {
         let of = |d: f64| nearest(BINS as f64 * d / deepest - 0.5).min(BINS - 1);
         let a = mean_of(pixels.iter().filter(|p| p.depth > 0.0 && of(p.depth) == bin).map(|p| p.a));
-        row.put(Family::Rim, format!("rim to centre, bin {} of {BINS}", bin + 1), (a - outer) / contrast.max(0.02));
+        row.put(
+            FeatureKind::Border,
+            format!("rim to centre, bin {} of {BINS}", bin + 1),
+            (a - outer) / contrast.max(0.02),
+        );
     }
     let at_depth = |d: f64| mean_of(pixels.iter().filter(|p| (p.depth - d).abs() < 0.75).map(|p| p.a));
     let profile: Vec<f64> = (-REACH_PX..REACH_PX).map(|d| at_depth(f64::from(d) + 0.5)).collect();
     let steepest = profile.windows(2).map(|w| w[1] - w[0]).filter(|s| s.is_finite()).fold(1e-3, f64::max);
     // The step of an edge blurred by σ has the slope 1/(σ √(2π)) of its height.
-    row.put(Family::Rim, "rim sigma, px", contrast / (steepest * TAU.sqrt()));
+    row.put(FeatureKind::Border, "rim sigma, px", contrast / (steepest * TAU.sqrt()));
     let inwards = profile.iter().skip(profile.len() / 2).filter(|v| v.is_finite());
     let membrane = inwards.copied().fold(f64::NEG_INFINITY, f64::max);
-    row.put(Family::Rim, "darkest depth over core", (membrane - inner) / contrast.max(0.02));
+    row.put(FeatureKind::Border, "darkest depth over core", (membrane - inner) / contrast.max(0.02));
     let rim_slope = |s: usize| {
         mean_of(pixels.iter().filter(|p| p.depth.abs() < 1.5 && p.sector == s).map(|p| f64::from(maps.slope[p.index])))
     };
     let slopes = known((0..SECTORS).map(rim_slope));
-    row.put(Family::Rim, "rim slope over contrast", mean(&slopes) / contrast.max(0.02));
-    row.put(Family::Rim, "rim unevenness", deviation(&slopes) / mean(&slopes).max(1e-3));
+    row.put(FeatureKind::Border, "rim slope over contrast", mean(&slopes) / contrast.max(0.02));
+    row.put(FeatureKind::Border, "rim unevenness", deviation(&slopes) / mean(&slopes).max(1e-3));
 
     let rests = detrended(&core);
     let at = |index: usize| core.binary_search_by_key(&index, |p| p.index).ok().map(|i| rests[i]);
@@ -116,25 +120,29 @@ pub(crate) fn features(maps: &Maps, region: &Region, ids: &[u32], pixel_um: f64)
     };
     for lag in LAGS {
         let both = [alike(lag, 0), alike(0, lag)];
-        row.put(Family::Texture, format!("core correlation at {lag} px"), mean(&both));
+        row.put(FeatureKind::Texture, format!("core correlation at {lag} px"), mean(&both));
         if lag <= 2 {
-            row.put(Family::Noise, format!("core correlation down less across at {lag} px"), both[1] - both[0]);
+            row.put(FeatureKind::Noise, format!("core correlation down less across at {lag} px"), both[1] - both[0]);
         }
     }
     let rest = deviation(&rests);
-    row.put(Family::Texture, "core sd without trend", rest);
+    row.put(FeatureKind::Texture, "core sd without trend", rest);
     for (band, name) in [(0, "1"), (1, "2"), (2, "4")] {
-        row.put(Family::Texture, format!("core power at {name} px"), maps.power(core.iter().map(|p| p.index), band));
+        row.put(
+            FeatureKind::Texture,
+            format!("core power at {name} px"),
+            maps.power(core.iter().map(|p| p.index), band),
+        );
     }
     let slope_inside = mean_of(core.iter().map(|p| f64::from(maps.slope[p.index])));
-    row.put(Family::Texture, "core slope", slope_inside);
-    row.put(Family::Texture, "core slope over sd", slope_inside / rest.max(1e-3));
+    row.put(FeatureKind::Texture, "core slope", slope_inside);
+    row.put(FeatureKind::Texture, "core slope over sd", slope_inside / rest.max(1e-3));
     let [spots, holes] = maps.extrema(core.iter().map(|p| p.index));
-    row.put(Family::Texture, "dark spots, um-2", spots / um2);
-    row.put(Family::Texture, "pale spots, um-2", holes / um2);
+    row.put(FeatureKind::Texture, "dark spots, um-2", spots / um2);
+    row.put(FeatureKind::Texture, "pale spots, um-2", holes / um2);
 
     let grey = descriptors(core.iter().map(|p| maps.grey[p.index]));
-    DESCRIPTORS.into_iter().zip(grey).for_each(|(name, value)| row.put(Family::Texture, name, value));
+    DESCRIPTORS.into_iter().zip(grey).for_each(|(name, value)| row.put(FeatureKind::Texture, name, value));
     row
 }
 

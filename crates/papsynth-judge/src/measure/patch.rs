@@ -4,10 +4,12 @@ use multiversion::multiversion;
 
 use super::maps::{BANDS, Maps, width_at};
 use super::noise::{Noise, blocks};
+use crate::control::Control;
+use crate::error::Error;
 use crate::filter::{blur, gradient};
 use crate::number::whole;
 use crate::statistics::{of_sorted, sorted};
-use crate::table::{Family, Row, Table};
+use crate::table::{FeatureKind, FeatureTable, Row};
 
 /// Side of a patch, pixels; smaller fields are one patch.
 pub(crate) const PATCH_PX: usize = 200;
@@ -52,7 +54,8 @@ struct Fine<'a> {
 }
 
 /// The features of all patches of a field.
-pub(crate) fn patches(maps: &Maps) -> Table {
+pub(crate) fn patches(maps: &Maps, control: &Control) -> Result<FeatureTable, Error> {
+    control.check()?;
     let fine = Fine {
         maps,
         gradient: gradient(&maps.smooth, maps.width),
@@ -65,7 +68,8 @@ pub(crate) fn patches(maps: &Maps) -> Table {
     let places = starts(maps.height, high).flat_map(|top| starts(maps.width, wide).map(move |left| [left, top]));
     let patch = |[left, top]: [usize; 2]| {
         let window = Window { left, top, wide, high };
-        (features(&fine, window), [(left + wide / 2) as f64, (top + high / 2) as f64])
+        control.check()?;
+        Ok((features(&fine, window), [(left + wide / 2) as f64, (top + high / 2) as f64]))
     };
     places.map(patch).collect()
 }
@@ -97,12 +101,12 @@ fn features(fine: &Fine, window: Window) -> Row {
 
     let thinned = sorted(smooth.iter().step_by(THINNED).map(|v| f64::from(*v)));
     for q in QUANTILES {
-        row.put(Family::Stain, format!("absorbance, quantile {q}"), of_sorted(&thinned, q));
+        row.put(FeatureKind::Absorbance, format!("absorbance, quantile {q}"), of_sorted(&thinned, q));
     }
     for (i, from) in STEPS.iter().enumerate() {
         let to = STEPS.get(i + 1).copied().unwrap_or(f32::INFINITY);
         let count = smooth.iter().filter(|v| **v >= *from && **v < to).count();
-        row.put(Family::Stain, format!("part of absorbance {from} and more"), part(count));
+        row.put(FeatureKind::Absorbance, format!("part of absorbance {from} and more"), part(count));
     }
 
     let mut powers = Vec::new();
@@ -114,13 +118,13 @@ fn features(fine: &Fine, window: Window) -> Row {
         let fourth = values.iter().map(|v| v * v * v * v).sum::<f64>() / n;
         let power = libm::log10(square.max(1e-10));
         let sparseness = libm::log10(fourth / (square * square).max(1e-18));
-        row.put(Family::Spectrum, format!("log power at {px} px"), power);
-        row.put(Family::Spectrum, format!("sparseness at {px} px"), sparseness);
+        row.put(FeatureKind::Spectrum, format!("log power at {px} px"), power);
+        row.put(FeatureKind::Spectrum, format!("sparseness at {px} px"), sparseness);
         powers.push(power);
     }
     for i in 1..BANDS {
         let (px, finer) = (1 << i, 1 << (i - 1));
-        row.put(Family::Spectrum, format!("log power at {px} over {finer} px"), powers[i] - powers[i - 1]);
+        row.put(FeatureKind::Spectrum, format!("log power at {px} over {finer} px"), powers[i] - powers[i - 1]);
     }
 
     edges(&mut row, fine, window);
@@ -135,16 +139,16 @@ fn features(fine: &Fine, window: Window) -> Row {
     for ((high, low), sigma) in fine.hessians.iter().zip(HESSIANS) {
         let (valley, ridge) = (over(high, &|v| f64::from(v.max(0.0))), over(low, &|v| f64::from(-v.min(0.0))));
         let weak = over(high, &|v| f64::from(v.min(0.0).abs()));
-        row.put(Family::Texture, format!("log dark ridges at {sigma} px"), libm::log10(ridge.max(1e-6)));
-        row.put(Family::Texture, format!("pale over dark ridges at {sigma} px"), valley / ridge.max(1e-6));
-        row.put(Family::Texture, format!("blobs over ridges at {sigma} px"), weak / ridge.max(1e-6));
+        row.put(FeatureKind::Texture, format!("log dark ridges at {sigma} px"), libm::log10(ridge.max(1e-6)));
+        row.put(FeatureKind::Texture, format!("pale over dark ridges at {sigma} px"), valley / ridge.max(1e-6));
+        row.put(FeatureKind::Texture, format!("blobs over ridges at {sigma} px"), weak / ridge.max(1e-6));
     }
     for ((coherence, energy), [sigma, _]) in fine.tensors.iter().zip(TENSORS) {
         let total = over(energy, &f64::from);
         let product: Vec<f32> = coherence.iter().zip(energy).map(|(c, e)| c * e).collect();
-        row.put(Family::Texture, format!("coherence at {sigma} px"), over(coherence, &f64::from));
+        row.put(FeatureKind::Texture, format!("coherence at {sigma} px"), over(coherence, &f64::from));
         let of_edges = over(&product, &f64::from) / total.max(1e-9);
-        row.put(Family::Texture, format!("coherence of edges at {sigma} px"), of_edges);
+        row.put(FeatureKind::Texture, format!("coherence of edges at {sigma} px"), of_edges);
     }
     for (classes, (radius, _)) in fine.patterns.iter().zip(PATTERNS) {
         let mut counts = [0_usize; CLASSES];
@@ -158,7 +162,7 @@ fn features(fine: &Fine, window: Window) -> Row {
         let total = if everywhere { a.len() } else { objects };
         for (i, count) in counts.iter().enumerate() {
             let value = if total < MIN_OBJECT { f64::NAN } else { *count as f64 / total as f64 };
-            row.put(Family::Texture, format!("pattern {i} at {radius} px"), value);
+            row.put(FeatureKind::Texture, format!("pattern {i} at {radius} px"), value);
         }
     }
     row
@@ -174,18 +178,18 @@ fn edges(row: &mut Row, fine: &Fine, window: Window) {
     let maps = fine.maps;
     let slopes = sorted(window.of(&maps.slope, maps.width, 0).step_by(THINNED).map(f64::from));
     for q in [0.5, 0.75, 0.9, 0.97, 0.995] {
-        row.put(Family::Edges, format!("log slope, quantile {q}"), libm::log10(of_sorted(&slopes, q).max(1e-5)));
+        row.put(FeatureKind::Edges, format!("log slope, quantile {q}"), libm::log10(of_sorted(&slopes, q).max(1e-5)));
     }
     let sum = |image: &[f32]| window.of(image, maps.width, 0).map(|v| f64::from(v.abs())).sum::<f64>();
     let [across, down] = fine.gradient.each_ref().map(|image| sum(image).max(1e-9));
-    row.put(Family::Edges, "log slope across over down", libm::log10(across / down));
+    row.put(FeatureKind::Edges, "log slope across over down", libm::log10(across / down));
     let within = |p: usize| {
         let (x, y) = (p % maps.width, p / maps.width);
         (window.left..window.left + window.wide).contains(&x) && (window.top..window.top + window.high).contains(&y)
     };
     let widths = sorted(maps.edges.iter().filter(|e| within(e.pixel)).map(|e| e.sigma));
     for q in [0.1, 0.5, 0.9] {
-        row.put(Family::Edges, format!("edge sigma, px, quantile {q}"), width_at(&widths, q));
+        row.put(FeatureKind::Edges, format!("edge sigma, px, quantile {q}"), width_at(&widths, q));
     }
 }
 
@@ -197,9 +201,9 @@ fn noise(row: &mut Row, maps: &Maps, window: Window) {
     blocks.truncate(whole((FLAT * blocks.len() as f64).ceil()));
     let noise = Noise::mean(&mut blocks);
     let known = |f: &dyn Fn(&Noise) -> f64| noise.as_ref().map_or(f64::NAN, f);
-    row.put(Family::Noise, "log noise, dn", known(&|n| 0.5 * libm::log10(n.variance.max(1e-4))));
+    row.put(FeatureKind::Noise, "log noise, dn", known(&|n| 0.5 * libm::log10(n.variance.max(1e-4))));
     for (lag, (name, _)) in Noise::LAGS.iter().enumerate() {
-        row.put(Family::Noise, format!("noise correlation {name}"), known(&|n| n.correlation(lag)));
+        row.put(FeatureKind::Noise, format!("noise correlation {name}"), known(&|n| n.correlation(lag)));
     }
 }
 
@@ -286,6 +290,10 @@ fn classes() -> Vec<u8> {
 mod tests {
     use super::*;
 
+    fn measured(maps: &Maps) -> FeatureTable {
+        patches(maps, &Control::NONE).unwrap()
+    }
+
     #[test]
     fn patterns_are_those_counted_pixel_by_pixel() {
         let maps = Maps::drawn(41, 37, |x, y| 120.0 + (x * x * 7.0 + y * 13.0 + x * y) % 23.0);
@@ -312,18 +320,18 @@ mod tests {
         let spots = |x: f64, y: f64| if x % 16.0 < 4.0 && y % 16.0 < 4.0 { 150.0 } else { 170.0 };
         // A bright margin is the empty slide.
         let field = |of: fn(f64, f64) -> f64| {
-            patches(&Maps::drawn(200, 200, move |x, y| if x < 40.0 { 240.0 } else { of(x, y) }))
+            measured(&Maps::drawn(200, 200, move |x, y| if x < 40.0 { 240.0 } else { of(x, y) }))
         };
         let (lines, spots) = (field(lines), field(spots));
         assert_eq!((lines.len(), spots.len()), (1, 1));
-        let value = |table: &Table, name: &str| table.column(name).next().unwrap();
+        let value = |table: &FeatureTable, name: &str| table.column(name).next().unwrap();
         assert!(value(&lines, "coherence at 1 px") > 0.8 && value(&spots, "coherence at 1 px") < 0.6);
         assert!(value(&lines, "blobs over ridges at 3 px") < value(&spots, "blobs over ridges at 3 px"));
     }
 
     #[test]
     fn a_field_is_cut_into_patches_from_its_corner() {
-        let table = patches(&Maps::drawn(430, 250, |x, y| 200.0 + x % 7.0 + y % 5.0));
+        let table = measured(&Maps::drawn(430, 250, |x, y| 200.0 + x % 7.0 + y % 5.0));
         assert_eq!(table.places, [[100.0, 100.0], [300.0, 100.0]]);
         let names: std::collections::BTreeSet<&str> = table.features.iter().map(|f| f.name.as_str()).collect();
         assert_eq!(names.len(), table.features.len());

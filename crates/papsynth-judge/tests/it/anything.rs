@@ -1,6 +1,8 @@
 //! Whatever the pixels, nothing panics.
 
-use papsynth_judge::{Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture, TwoSampleParams};
+use papsynth_judge::{
+    FieldImage, Judge, JudgeParams, Measurer, MeasurerParams, NucleiAnnotation, NucleiFrom, TwoSampleParams,
+};
 use proptest::prelude::*;
 
 fn grey(kind: u8, i: usize, width: usize, seed: u64) -> f32 {
@@ -17,15 +19,17 @@ fn grey(kind: u8, i: usize, width: usize, seed: u64) -> f32 {
     f32::from(u8::try_from(level.min(255)).unwrap())
 }
 
-fn picture(kind: u8, width: usize, height: usize, seed: u64, known: u8) -> Picture {
+fn picture(kind: u8, width: usize, height: usize, seed: u64, known: u8) -> FieldImage {
     let pixels = width * height;
     let nuclei = match known {
-        0 => Known::Nothing,
-        1 => Known::Points((0..5).map(|k| [(seed % 400) as f64 - 50.0 * k as f64, 1e6 - 2e5 * k as f64]).collect()),
-        _ => Known::Masks((0..pixels).map(|i| u32::try_from((i / 37) % 5).unwrap()).collect()),
+        0 => NucleiAnnotation::None,
+        1 => NucleiAnnotation::Points(
+            (0..5).map(|k| [(seed % 400) as f64 - 50.0 * k as f64, 1e6 - 2e5 * k as f64]).collect(),
+        ),
+        _ => NucleiAnnotation::Masks((0..pixels).map(|i| u32::try_from((i / 37) % 5).unwrap()).collect()),
     };
     let grey = (0..pixels).map(|i| grey(kind, i, width, seed)).collect();
-    Picture { name: "any".to_owned(), group: String::new(), grey, width, full_scale: 255.0, nuclei }
+    FieldImage { name: "any".to_owned(), group: String::new(), grey, width, full_scale: 255.0, nuclei }
 }
 
 proptest! {
@@ -37,9 +41,9 @@ proptest! {
         from in 0_usize..3,
     ) {
         let nuclei_from = NucleiFrom::ALL[from];
-        let gauge = Gauge::new(&GaugeParams { pixel_um, nuclei_from, ..GaugeParams::default() }).unwrap();
+        let measurer = Measurer::new(&MeasurerParams { pixel_um, nuclei_from, ..MeasurerParams::default() }).unwrap();
         let picture = picture(kind, width, height, seed, known);
-        if let Ok(field) = gauge.measure(&picture) {
+        if let Ok(field) = measurer.measure(&picture) {
             prop_assert_eq!(field.nuclei.values.len(), field.nuclei.len() * field.nuclei.features.len());
             prop_assert_eq!(field.patches.len(), 1);
             let parts: f64 = field.statistics.histogram.iter().sum();
@@ -51,9 +55,9 @@ proptest! {
 
     #[test]
     fn any_sets_of_fields_are_judged(kinds in proptest::collection::vec(0_u8..6, 5), seed: u64) {
-        let gauge = Gauge::new(&GaugeParams::default()).unwrap();
-        let measured: Vec<_> = kinds.iter().filter_map(|k| gauge.measure(&picture(*k, 64, 48, seed ^ u64::from(*k), 0)).ok()).collect();
-        let two_sample = TwoSampleParams { trees: 20, halvings: 1, bootstrap: 10, shuffled: 2, folds: 2 };
+        let measurer = Measurer::new(&MeasurerParams::default()).unwrap();
+        let measured: Vec<_> = kinds.iter().filter_map(|k| measurer.measure(&picture(*k, 64, 48, seed ^ u64::from(*k), 0)).ok()).collect();
+        let two_sample = TwoSampleParams { trees: 20, half_splits: 1, bootstrap: 10, permuted: 2, folds: 2 };
         let judge = Judge::new(&JudgeParams { two_sample, draws: 20, seed, ..JudgeParams::default() }).unwrap();
         if measured.len() >= 4 {
             let report = judge.compare(&measured[..2], &measured[2..]).unwrap();

@@ -1,11 +1,14 @@
-//! What is measured on pictures that are known.
+//! Measurements of images with known properties.
 
-use papsynth_judge::{Detail, Error, Gauge, GaugeParams, Known, NucleiFrom, Picture, Statistics};
+use papsynth_judge::{
+    Control, Detail, Error, FieldImage, Measurer, MeasurerParams, NucleiAnnotation, NucleiFrom, Progress, Statistics,
+    describe,
+};
 
 use crate::support::Toy;
 
-fn gauge(nuclei_from: NucleiFrom) -> Gauge {
-    Gauge::new(&GaugeParams { nuclei_from, ..GaugeParams::default() }).unwrap()
+fn measurer(nuclei_from: NucleiFrom) -> Measurer {
+    Measurer::new(&MeasurerParams { nuclei_from, ..MeasurerParams::default() }).unwrap()
 }
 
 fn close(value: f64, wanted: f64, within: f64) {
@@ -20,7 +23,7 @@ fn middle(mut values: Vec<f64>) -> f64 {
 #[test]
 fn toy_fields_are_measured_as_they_were_made() {
     let toy = Toy { width: 640, height: 480, cells: 7, ..Toy::default() };
-    let fields: Vec<_> = toy.pictures(6, 1).iter().map(|p| gauge(NucleiFrom::Points).measure(p).unwrap()).collect();
+    let fields: Vec<_> = toy.pictures(6, 1).iter().map(|p| measurer(NucleiFrom::Points).measure(p).unwrap()).collect();
     let of = |f: &dyn Fn(&Statistics) -> f64| middle(fields.iter().map(|field| f(&field.statistics)).collect());
     // 1 − 0.03 x² − 0.01 y², whose mean is 1 − 0.04/3.
     close(of(&|s| s.background_dn), 230.0 * (1.0 - 0.04 / 3.0), 0.5);
@@ -48,9 +51,9 @@ fn toy_fields_are_measured_as_they_were_made() {
 #[test]
 fn nuclei_are_the_same_by_search_by_points_and_by_masks() {
     let picture = Toy { cells: 4, ..Toy::default() }.picture(11);
-    let Known::Points(points) = &picture.nuclei else { unreachable!() };
-    let found = gauge(NucleiFrom::Search).measure(&picture).unwrap();
-    let marked = gauge(NucleiFrom::Points).measure(&picture).unwrap();
+    let NucleiAnnotation::Points(points) = &picture.nuclei else { unreachable!() };
+    let found = measurer(NucleiFrom::Search).measure(&picture).unwrap();
+    let marked = measurer(NucleiFrom::Points).measure(&picture).unwrap();
     assert_eq!(found.nuclei, marked.nuclei);
     assert_eq!(found.nuclei.len(), 4);
     let inside = |i: usize| {
@@ -58,22 +61,25 @@ fn nuclei_are_the_same_by_search_by_points_and_by_masks() {
         let near = |p: &[f64; 2]| (p[0] - x) * (p[0] - x) + (p[1] - y) * (p[1] - y) < 100.0;
         points.iter().position(near).map_or(0, |i| u32::try_from(i).unwrap() + 1)
     };
-    let masks = Picture { nuclei: Known::Masks((0..picture.grey.len()).map(inside).collect()), ..picture.clone() };
-    let given = gauge(NucleiFrom::Masks).measure(&masks).unwrap();
+    let masks = FieldImage {
+        nuclei: NucleiAnnotation::Masks((0..picture.grey.len()).map(inside).collect()),
+        ..picture.clone()
+    };
+    let given = measurer(NucleiFrom::Masks).measure(&masks).unwrap();
     assert_eq!(given.nuclei.len(), 4);
     for (a, b) in given.nuclei.places.iter().zip(&found.nuclei.places) {
         assert!((a[0] - b[0]).abs() + (a[1] - b[1]).abs() < 1.5, "{a:?} {b:?}");
     }
     // The centres of masks serve as points.
-    assert_eq!(gauge(NucleiFrom::Points).measure(&masks).unwrap().nuclei, marked.nuclei);
+    assert_eq!(measurer(NucleiFrom::Points).measure(&masks).unwrap().nuclei, marked.nuclei);
 }
 
 #[test]
 fn statistics_are_the_same_at_either_detail() {
     let picture = Toy::default().picture(3);
-    let everything = gauge(NucleiFrom::Search).measure(&picture).unwrap();
-    let params = GaugeParams { detail: Detail::Statistics, ..GaugeParams::default() };
-    let short = Gauge::new(&params).unwrap().measure(&picture).unwrap();
+    let everything = measurer(NucleiFrom::Search).measure(&picture).unwrap();
+    let params = MeasurerParams { detail: Detail::Statistics, ..MeasurerParams::default() };
+    let short = Measurer::new(&params).unwrap().measure(&picture).unwrap();
     assert_eq!(format!("{:?}", short.statistics), format!("{:?}", everything.statistics));
     assert!(short.patches.is_empty() && !everything.patches.is_empty());
 }
@@ -81,10 +87,10 @@ fn statistics_are_the_same_at_either_detail() {
 #[test]
 fn scale_of_grey_levels_and_dead_borders_do_not_matter() {
     let picture = Toy::default().picture(5);
-    let plain = gauge(NucleiFrom::Points).measure(&picture).unwrap();
+    let plain = measurer(NucleiFrom::Points).measure(&picture).unwrap();
     let deep =
-        Picture { grey: picture.grey.iter().map(|g| g * 257.0).collect(), full_scale: 65_535.0, ..picture.clone() };
-    let deep = gauge(NucleiFrom::Points).measure(&deep).unwrap();
+        FieldImage { grey: picture.grey.iter().map(|g| g * 257.0).collect(), full_scale: 65_535.0, ..picture.clone() };
+    let deep = measurer(NucleiFrom::Points).measure(&deep).unwrap();
     close(deep.statistics.background_dn, plain.statistics.background_dn, 1e-3);
     assert_eq!(deep.nuclei.places, plain.nuclei.places);
     // Two black rows below, three black columns to the left.
@@ -94,10 +100,10 @@ fn scale_of_grey_levels_and_dead_borders_do_not_matter() {
         grey.extend_from_slice(row);
     }
     grey.extend(vec![1.0; 2 * (picture.width + 3)]);
-    let Known::Points(points) = &picture.nuclei else { unreachable!() };
-    let nuclei = Known::Points(points.iter().map(|p| [p[0] + 3.0, p[1]]).collect());
-    let framed = Picture { grey, width: picture.width + 3, nuclei, ..picture.clone() };
-    let framed = gauge(NucleiFrom::Points).measure(&framed).unwrap();
+    let NucleiAnnotation::Points(points) = &picture.nuclei else { unreachable!() };
+    let nuclei = NucleiAnnotation::Points(points.iter().map(|p| [p[0] + 3.0, p[1]]).collect());
+    let framed = FieldImage { grey, width: picture.width + 3, nuclei, ..picture.clone() };
+    let framed = measurer(NucleiFrom::Points).measure(&framed).unwrap();
     assert_eq!((framed.width, framed.height), (plain.width, plain.height));
     assert_eq!(framed.nuclei, plain.nuclei);
     assert_eq!(framed.patches, plain.patches);
@@ -106,34 +112,40 @@ fn scale_of_grey_levels_and_dead_borders_do_not_matter() {
 #[test]
 fn what_is_no_picture_is_refused() {
     let good = Toy::default().picture(1);
-    let refused = |picture: Picture| gauge(NucleiFrom::Masks).measure(&picture).unwrap_err();
+    let refused = |picture: FieldImage| measurer(NucleiFrom::Masks).measure(&picture).unwrap_err();
     let [mut nan, mut negative, mut bright] = [good.grey.clone(), good.grey.clone(), good.grey.clone()];
     nan[7] = f32::NAN;
     negative[7] = -1.0;
     bright[7] = 256.0;
     for grey in [nan, negative, bright, vec![7.0; good.grey.len()]] {
-        assert!(matches!(refused(Picture { grey, ..good.clone() }), Error::Picture { .. }));
+        assert!(matches!(refused(FieldImage { grey, ..good.clone() }), Error::Image { .. }));
     }
     for width in [0, 31, 319] {
-        let message = refused(Picture { width, ..good.clone() }).to_string();
+        let message = refused(FieldImage { width, ..good.clone() }).to_string();
         assert!(message.contains(&format!("` is {width} x ")) && message.ends_with("at least 32 a side"), "{message}");
     }
     for full_scale in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        assert!(matches!(refused(Picture { full_scale, ..good.clone() }), Error::Picture { .. }));
+        assert!(matches!(refused(FieldImage { full_scale, ..good.clone() }), Error::Image { .. }));
     }
-    assert!(matches!(refused(Picture { nuclei: Known::Masks(vec![1; 7]), ..good.clone() }), Error::Picture { .. }));
-    assert!(matches!(refused(Picture { nuclei: Known::Points(vec![[f64::NAN, 1.0]]), ..good }), Error::Picture { .. }));
+    assert!(matches!(
+        refused(FieldImage { nuclei: NucleiAnnotation::Masks(vec![1; 7]), ..good.clone() }),
+        Error::Image { .. }
+    ));
+    assert!(matches!(
+        refused(FieldImage { nuclei: NucleiAnnotation::Points(vec![[f64::NAN, 1.0]]), ..good }),
+        Error::Image { .. }
+    ));
 }
 
 #[test]
 fn parameters_have_ranges() {
     for bad in [0.0, -1.0, f64::NAN, f64::INFINITY, 11.0] {
-        let params = GaugeParams { pixel_um: bad, ..GaugeParams::default() };
-        assert!(matches!(Gauge::new(&params), Err(Error::Parameter { field: "pixel_um", .. })));
+        let params = MeasurerParams { pixel_um: bad, ..MeasurerParams::default() };
+        assert!(matches!(Measurer::new(&params), Err(Error::Parameter { field: "pixel_um", .. })));
     }
-    let mut params = GaugeParams::default();
+    let mut params = MeasurerParams::default();
     params.nuclei.largest_um2 = 10.0;
-    let message = Gauge::new(&params).unwrap_err().to_string();
+    let message = Measurer::new(&params).unwrap_err().to_string();
     assert_eq!(message, "nuclei.largest_um2 is 10; accepted is nuclei.smallest_um2 to 100000 um2");
 }
 
@@ -142,9 +154,11 @@ fn coarser_pixels_keep_the_light_and_move_with_their_nuclei() {
     let picture = Toy::default().picture(2);
     let coarse = picture.coarsened(1.6);
     assert_eq!((coarse.width, coarse.height()), (200, 150));
-    let mean = |p: &Picture| p.grey.iter().map(|g| f64::from(*g)).sum::<f64>() / p.grey.len() as f64;
+    let mean = |p: &FieldImage| p.grey.iter().map(|g| f64::from(*g)).sum::<f64>() / p.grey.len() as f64;
     close(mean(&coarse), mean(&picture), 0.01);
-    let (Known::Points(fine), Known::Points(moved)) = (&picture.nuclei, &coarse.nuclei) else { unreachable!() };
+    let (NucleiAnnotation::Points(fine), NucleiAnnotation::Points(moved)) = (&picture.nuclei, &coarse.nuclei) else {
+        unreachable!()
+    };
     for (a, b) in fine.iter().zip(moved) {
         close(b[0], (a[0] + 0.5) / 1.6 - 0.5, 1e-12);
     }
@@ -158,11 +172,46 @@ fn coarser_pixels_keep_the_light_and_move_with_their_nuclei() {
 #[test]
 fn what_a_picture_allows_is_known() {
     for (known, from) in [
-        (Known::Nothing, NucleiFrom::Search),
-        (Known::Points(vec![]), NucleiFrom::Points),
-        (Known::Masks(vec![]), NucleiFrom::Masks),
+        (NucleiAnnotation::None, NucleiFrom::Search),
+        (NucleiAnnotation::Points(vec![]), NucleiFrom::Points),
+        (NucleiAnnotation::Masks(vec![]), NucleiFrom::Masks),
     ] {
         assert_eq!(NucleiFrom::of(&known), from);
         assert!(NucleiFrom::ALL.contains(&from));
     }
+}
+
+#[test]
+fn every_feature_and_statistic_has_its_own_description() {
+    let field = measurer(NucleiFrom::Points).measure(&Toy::default().picture(1)).unwrap();
+    for table in [&field.nuclei, &field.cells, &field.patches] {
+        assert!(!table.is_empty());
+        let described: std::collections::BTreeSet<String> = table.features.iter().map(|f| describe(&f.name)).collect();
+        assert_eq!(described.len(), table.features.len());
+        for feature in &table.features {
+            assert_ne!(describe(&feature.name), feature.name);
+        }
+    }
+    for (name, _) in field.statistics.scalars() {
+        assert!(describe(name) != name || name == "coverage", "{name}");
+    }
+}
+
+#[test]
+fn fields_are_measured_in_parallel_until_the_stop_flag_is_set() {
+    use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+    let images = Toy::default().pictures(4, 1);
+    let (stop, done) = (AtomicBool::new(false), AtomicUsize::new(0));
+    let count = |p: Progress| {
+        assert_eq!((p.phase, p.total), ("measuring fields", 4));
+        done.fetch_add(1, Ordering::Relaxed);
+    };
+    let measurer = measurer(NucleiFrom::Points);
+    let read = |image: &FieldImage| Ok::<FieldImage, Error>(image.clone());
+    let control = Control { stop: &stop, report: &count };
+    let fields = measurer.measure_all(&images, read, &control).unwrap();
+    assert_eq!(done.load(Ordering::Relaxed), 4);
+    assert_eq!(fields[2].nuclei, measurer.measure(&images[2]).unwrap().nuclei);
+    let control = Control { stop: &stop, report: &|_| stop.store(true, Ordering::Relaxed) };
+    assert_eq!(measurer.measure_all(&images, read, &control), Err(Error::Stopped));
 }

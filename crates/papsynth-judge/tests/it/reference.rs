@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use papsynth_judge::{
-    Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture, Report, TwoSampleParams, Verdict,
+    Conclusion, Field, FieldImage, Judge, JudgeParams, Measurer, MeasurerParams, NucleiAnnotation, NucleiFrom, Report,
+    TwoSampleParams,
 };
 use rayon::prelude::*;
 
@@ -18,7 +19,7 @@ fn reference() -> Option<PathBuf> {
 }
 
 /// All fields, in the order of their grades.
-fn pictures(folder: &Path) -> Vec<Picture> {
+fn pictures(folder: &Path) -> Vec<FieldImage> {
     let table = fs::read_to_string(folder.join("frames.csv")).unwrap();
     let rows: Vec<(&str, &str)> = table.lines().skip(1).filter_map(|line| line.split_once(',')).collect();
     let picture = |(name, group): &(&str, &str)| {
@@ -28,30 +29,30 @@ fn pictures(folder: &Path) -> Vec<Picture> {
             let (y, x) = line.split_once(',').unwrap();
             [x.parse().unwrap(), y.parse().unwrap()]
         };
-        Picture {
+        FieldImage {
             name: (*name).to_owned(),
             group: (*group).to_owned(),
             width: image.width() as usize,
             grey: image.into_raw().into_iter().map(f32::from).collect(),
             full_scale: 255.0,
-            nuclei: Known::Points(points.lines().map(point).collect()),
+            nuclei: NucleiAnnotation::Points(points.lines().map(point).collect()),
         }
     };
     rows.par_iter().map(picture).collect()
 }
 
-fn measured(pictures: &[Picture], nuclei_from: NucleiFrom) -> Vec<Field> {
-    let gauge = Gauge::new(&GaugeParams { nuclei_from, ..GaugeParams::default() }).unwrap();
-    pictures.par_iter().map(|p| gauge.measure(p).unwrap()).collect()
+fn measured(pictures: &[FieldImage], nuclei_from: NucleiFrom) -> Vec<Field> {
+    let measurer = Measurer::new(&MeasurerParams { nuclei_from, ..MeasurerParams::default() }).unwrap();
+    pictures.par_iter().map(|p| measurer.measure(p).unwrap()).collect()
 }
 
 fn judged(real: &[Field], synthetic: &[Field]) -> Report {
-    let two_sample = TwoSampleParams { trees: 60, halvings: 4, shuffled: 0, ..TwoSampleParams::default() };
+    let two_sample = TwoSampleParams { trees: 60, half_splits: 4, permuted: 0, ..TwoSampleParams::default() };
     Judge::new(&JudgeParams { two_sample, ..JudgeParams::default() }).unwrap().compare(real, synthetic).unwrap()
 }
 
-fn verdicts(report: &Report) -> Vec<(String, Verdict, f64)> {
-    report.two_sample.iter().map(|t| (t.name.clone(), t.verdict, t.result.auc)).collect()
+fn conclusions(report: &Report) -> Vec<(String, Conclusion, f64)> {
+    report.two_sample.iter().map(|t| (t.name.clone(), t.conclusion, t.result.auc)).collect()
 }
 
 #[test]
@@ -61,7 +62,7 @@ fn most_marked_nuclei_are_found_and_most_of_what_is_found_is_marked() {
     let fields = measured(&pictures, NucleiFrom::Search);
     let (mut marked, mut found, mut both) = (0, 0, 0);
     for (picture, field) in pictures.iter().zip(&fields) {
-        let Known::Points(points) = &picture.nuclei else { unreachable!() };
+        let NucleiAnnotation::Points(points) = &picture.nuclei else { unreachable!() };
         let mut free: Vec<[f64; 2]> = field.nuclei.places.clone();
         marked += points.len();
         found += free.len();
@@ -88,8 +89,8 @@ fn halves_of_the_real_fields_are_not_told_apart_and_grades_are() {
         fields.iter().enumerate().filter(|(i, _)| i % 2 == odd).map(|(_, f)| f.clone()).collect::<Vec<Field>>()
     };
     let report = judged(&half(0), &half(1));
-    eprintln!("halves: {:?}", verdicts(&report));
-    assert_eq!(report.verdict, Verdict::NotToldApart, "{:?}", verdicts(&report));
+    eprintln!("halves: {:?}", conclusions(&report));
+    assert_eq!(report.conclusion, Conclusion::NotDistinguishable, "{:?}", conclusions(&report));
 
     let of = |group: &str| fields.iter().filter(|f| f.group == group).cloned().collect::<Vec<Field>>();
     let (negative, mut swapped, high) = (of("N"), of("N"), of("H"));
@@ -98,7 +99,7 @@ fn halves_of_the_real_fields_are_not_told_apart_and_grades_are() {
         field.nuclei = other.nuclei.clone();
     }
     let report = judged(&negative, &swapped);
-    eprintln!("nuclei of high grade in negative fields: {:?}", verdicts(&report));
-    assert_eq!(report.two_sample[0].verdict, Verdict::ToldApart);
+    eprintln!("nuclei of high grade in negative fields: {:?}", conclusions(&report));
+    assert_eq!(report.two_sample[0].conclusion, Conclusion::Distinguishable);
     assert!(report.two_sample[0].result.auc > 0.9);
 }

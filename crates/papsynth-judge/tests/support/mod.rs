@@ -1,6 +1,6 @@
 //! Toy fields: round cells with round nuclei on a lit slide, each made of numbers that are known.
 
-use papsynth_judge::{Known, Picture};
+use papsynth_judge::{FieldImage, NucleiAnnotation};
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -38,7 +38,7 @@ struct Disc {
 
 impl Toy {
     /// A field of a seed; its nuclei are known by points.
-    pub(crate) fn picture(&self, seed: u64) -> Picture {
+    pub(crate) fn picture(&self, seed: u64) -> FieldImage {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         // Slides differ: strength of stain and of grain.
         let (stain, grain) = (1.0 + 0.15 * normal(&mut rng), 0.03 * (1.0 + 0.2 * normal(&mut rng)));
@@ -75,11 +75,11 @@ impl Toy {
             }
         }
         let name = format!("toy {seed}");
-        Picture { name, grey, width: self.width, nuclei: Known::Points(points), ..Picture::default() }
+        FieldImage { name, grey, width: self.width, nuclei: NucleiAnnotation::Points(points), ..FieldImage::default() }
     }
 
     /// Fields of seeds that follow each other.
-    pub(crate) fn pictures(&self, count: u64, seed: u64) -> Vec<Picture> {
+    pub(crate) fn pictures(&self, count: u64, seed: u64) -> Vec<FieldImage> {
         (seed..seed + count).map(|seed| self.picture(seed)).collect()
     }
 }

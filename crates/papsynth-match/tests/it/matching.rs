@@ -1,13 +1,15 @@
-//! From fields to a recipe, with everything small.
+//! Matches of small fields.
+
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::{Preset, Recipe};
 use papsynth::{Engine, Inputs};
-use papsynth_judge::{Known, NucleiFrom, Picture};
+use papsynth_judge::{Control, FieldImage, NucleiAnnotation, NucleiFrom, Progress};
 use papsynth_match::{
-    Error, Fit, Match, MatchParams, Origin, PARAMETERS, Parameter, PixelSize, Plan, Regression, Setting, Source,
-    Spreads, Step, Summary, TableParams, Values, View, WIDEST, measure, recipe, unseen,
+    Error, FieldSd, Fit, Match, MatchParams, Origin, PARAMETERS, Parameter, PixelSize, Plan, Regression, Setting,
+    Source, Summary, TableParams, Values, WIDEST, WindowSampler, measure, recipe, unseen,
 };
 use rayon::prelude::*;
 
@@ -27,18 +29,18 @@ fn setting(size_px: [usize; 2]) -> Setting {
         bits: 8,
         extended: true,
         seek_pixel: false,
-        spreads: Spreads::default(),
+        field_sd: FieldSd::default(),
     }
 }
 
 /// Fields of a microscope that differs from the preset.
-fn fields(count: u64, from: NucleiFrom) -> Vec<Picture> {
-    let view = View::new(FIELD, PIXEL_UM, from).unwrap();
+fn fields(count: u64, from: NucleiFrom) -> Vec<FieldImage> {
+    let view = WindowSampler::new(FIELD, PIXEL_UM, from).unwrap();
     let setting = setting(FIELD);
     let mut values = setting.base_values();
     for (parameter, value) in [
         (Parameter::Level, 0.8),
-        (Parameter::LevelSpread, 0.005),
+        (Parameter::LevelSd, 0.005),
         (Parameter::Noise, 3.0),
         (Parameter::Down, 0.3),
         (Parameter::Blur, 0.5),
@@ -51,13 +53,13 @@ fn fields(count: u64, from: NucleiFrom) -> Vec<Picture> {
 }
 
 fn small(pixel: PixelSize, rounds: usize) -> Match {
-    let table = TableParams { recipes: 30, windows: 2, seed: 5 };
-    Match::new(&MatchParams { pixel, table, rounds }, &Preset::Lbc.recipe()).unwrap()
+    let params = MatchParams { pixel, simulations: 60, windows: 2, rounds, seed: 5 };
+    Match::new(&params, &Preset::Lbc.recipe()).unwrap()
 }
 
-fn on_threads(threads: usize, fields: &[Picture], matching: &Match) -> Fit {
+fn on_threads(threads: usize, fields: &[FieldImage], matching: &Match) -> Fit {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    pool.install(|| matching.run(fields, &engine, &|_| true)).unwrap()
+    pool.install(|| matching.run(fields, &engine, &Control::NONE)).unwrap()
 }
 
 #[test]
@@ -72,13 +74,13 @@ fn a_recipe_is_found_and_is_the_same_with_any_number_of_threads() {
     assert!(one.recipe.problems().is_empty(), "{:?}", one.recipe.problems());
     engine(&one.recipe).unwrap();
     assert!(one.extended && one.fields == 3 && one.windows == 3 && one.simulated == 30);
-    let of = |parameter: Parameter| one.answers.iter().find(|a| a.parameter == parameter).unwrap();
+    let of = |parameter: Parameter| one.parameters.iter().find(|a| a.parameter == parameter).unwrap();
     for (parameter, truth) in [(Parameter::Level, 0.8), (Parameter::Noise, 3.0)] {
         let answer = of(parameter);
         assert_eq!(answer.origin, Origin::Measured, "{answer:?}");
         assert!((answer.interval[0]..=answer.interval[1]).contains(&truth), "{answer:?}");
     }
-    for answer in &one.answers {
+    for answer in &one.parameters {
         let [low, high] = answer.interval;
         match answer.origin {
             Origin::NotIdentified => assert_eq!(answer.value, answer.before, "{answer:?}"),
@@ -94,24 +96,24 @@ fn a_recipe_is_found_and_is_the_same_with_any_number_of_threads() {
 fn the_size_of_a_pixel_is_sought_where_it_is_asked_for() {
     let fields = fields(6, NucleiFrom::Masks);
     let fit = on_threads(2, &fields, &small(PixelSize::Sought(0.4), 0));
-    let has = |parameter: Parameter| fit.answers.iter().any(|a| a.parameter == parameter);
+    let has = |parameter: Parameter| fit.parameters.iter().any(|a| a.parameter == parameter);
     assert!(has(Parameter::Pixel) && !has(Parameter::Size));
-    let [low, high] = fit.answers.iter().find(|a| a.parameter == Parameter::Pixel).unwrap().interval;
+    let [low, high] = fit.parameters.iter().find(|a| a.parameter == Parameter::Pixel).unwrap().interval;
     assert!(low <= PIXEL_UM && PIXEL_UM <= high, "{low} to {high}");
 }
 
 #[test]
 fn what_is_asked_for_in_vain_is_told() {
-    let flat = |name: &str, width: usize, of: &dyn Fn(usize) -> f32| Picture {
+    let flat = |name: &str, width: usize, of: &dyn Fn(usize) -> f32| FieldImage {
         name: name.to_owned(),
         group: String::new(),
         grey: (0..width * 120).map(of).collect(),
         width,
         full_scale: 255.0,
-        nuclei: Known::Nothing,
+        nuclei: NucleiAnnotation::None,
     };
-    let run = |fields: &[Picture]| {
-        small(PixelSize::Known(PIXEL_UM), 0).run(fields, &engine, &|_| true).unwrap_err().to_string()
+    let run = |fields: &[FieldImage]| {
+        small(PixelSize::Known(PIXEL_UM), 0).run(fields, &engine, &Control::NONE).unwrap_err().to_string()
     };
     let noisy = |i: usize| 200.0 + (i * 7919 % 13) as f32 / 3.0;
     assert_eq!(run(&[]), Error::NoField.to_string());
@@ -133,6 +135,8 @@ fn what_is_asked_for_in_vain_is_told() {
         MatchParams { rounds: 1001, ..MatchParams::default() },
         MatchParams { pixel: PixelSize::Known(f64::NAN), ..MatchParams::default() },
         MatchParams { pixel: PixelSize::Sought(0.0), ..MatchParams::default() },
+        MatchParams { simulations: 59, ..MatchParams::default() },
+        MatchParams { windows: 0, ..MatchParams::default() },
     ] {
         assert!(
             matches!(Match::new(&params, &base), Err(Error::Judge(papsynth_judge::Error::Parameter { .. }))),
@@ -140,17 +144,15 @@ fn what_is_asked_for_in_vain_is_told() {
         );
     }
     let fields = fields(2, NucleiFrom::Search);
-    for table in
-        [TableParams { recipes: 29, ..TableParams::default() }, TableParams { windows: 0, ..Default::default() }]
-    {
-        let matching = Match::new(&MatchParams { pixel: PixelSize::Known(PIXEL_UM), table, rounds: 0 }, &base).unwrap();
-        assert!(matches!(
-            matching.run(&fields, &engine, &|_| true),
-            Err(Error::Judge(papsynth_judge::Error::Parameter { .. }))
-        ));
-    }
-    let stop = |step: Step| !matches!(step, Step::Simulated(3.., _));
-    assert_eq!(small(PixelSize::Known(PIXEL_UM), 0).run(&fields, &engine, &stop), Err(Error::Stopped));
+    let stop = AtomicBool::new(false);
+    let after_three = |p: Progress| {
+        if p.phase == "simulating fields" && p.done == 3 {
+            assert_eq!(p.total, 60 + 4 * 2);
+            stop.store(true, Ordering::Relaxed);
+        }
+    };
+    let control = Control { stop: &stop, report: &after_three };
+    assert_eq!(small(PixelSize::Known(PIXEL_UM), 0).run(&fields, &engine, &control), Err(Error::Stopped));
 }
 
 /// `examples/recover.rs` in small.
@@ -159,7 +161,7 @@ fn recipes_that_were_not_seen_are_recovered() {
     const TRIALS: usize = 8;
     const WINDOWS: usize = 2;
     const SEED: u64 = 71;
-    let view = View::new([256, 192], PIXEL_UM, NucleiFrom::Masks).unwrap();
+    let view = WindowSampler::new([256, 192], PIXEL_UM, NucleiFrom::Masks).unwrap();
     let setting = setting(view.simulated_px());
     let mut known = setting.base_values();
     known.set(Parameter::Pattern, 0.01);
@@ -168,7 +170,7 @@ fn recipes_that_were_not_seen_are_recovered() {
     let sought = plan.sought().to_vec();
     assert!(sought.iter().all(|p| p.prior().source == Source::Simulated));
     let first = plan.row(0).unwrap();
-    let table = plan.simulate(&|_| true).unwrap();
+    let table = plan.simulate(&Control::NONE).unwrap();
     assert!(table.places[0] == first.0 && format!("{:?}", table.statistics[0]) == format!("{:?}", first.1.values));
     let regression = Regression::new(&table.statistics, &table.places);
     let explained = |parameter: Parameter| regression.explained()[sought.iter().position(|p| *p == parameter).unwrap()];
@@ -177,7 +179,7 @@ fn recipes_that_were_not_seen_are_recovered() {
     }
 
     let drawn = unseen(TRIALS, SEED);
-    let run = |row: usize, values: &Values| -> Vec<Picture> {
+    let run = |row: usize, values: &Values| -> Vec<FieldImage> {
         let engine = engine(&recipe(&setting, values, |_| true)).unwrap();
         let key = |k: usize| Key { seed: SEED, index: (row * WINDOWS + k) as u64 };
         (0..WINDOWS).map(|k| view.simulate_field(&engine, key(k)).unwrap()).collect()
@@ -188,7 +190,7 @@ fn recipes_that_were_not_seen_are_recovered() {
         .map(|row| {
             let mut values = known.clone();
             sought.iter().for_each(|p| values.set(*p, p.prior().value(drawn[row][p.index()])));
-            let cut: Vec<Picture> = run(row, &values).iter().flat_map(|f| view.windows(f)).collect();
+            let cut: Vec<FieldImage> = run(row, &values).iter().flat_map(|f| view.windows(f)).collect();
             let summary = Summary::of(&cut, &view).unwrap();
             assert_eq!(summary.names, table.names);
             let estimates = regression.estimate(&summary.values);

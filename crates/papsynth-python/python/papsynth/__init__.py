@@ -5,7 +5,7 @@
 >>> frame.image.shape, frame.labels["nucleus"].dtype
 ((240, 320), dtype('int32'))
 
-The same recipe, model, seed and index give the same bytes as the command line, whatever the threads.
+The same recipe, model, seed and index give the same bytes as the command line, with any number of threads.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from __future__ import annotations
 from . import cloth, cytoskeleton, dyes, fields, fsd, noise, optics, texture
 from ._calibrate import calibrate_camera, calibrate_microscope
 from ._dataset import Dataset, IterableDataset
-from ._errors import Fault, RecipeError
+from ._errors import FieldError, RecipeError
 from ._learn import judge, learn
 from ._native import Engine, Frame
 from ._native import recipe_schema as _recipe_schema
@@ -26,7 +26,7 @@ from ._target import detection_target
 __all__ = [
     "Dataset",
     "Engine",
-    "Fault",
+    "FieldError",
     "Frame",
     "IterableDataset",
     "RecipeError",
@@ -54,22 +54,22 @@ __all__ = [
 
 
 def recipe(recipe=None) -> dict:
-    """A recipe with everything that was left out.
+    """Return a complete recipe, with the defaults of all omitted fields.
 
     Parameters
     ----------
     recipe : None, str, os.PathLike or dict
-        Nothing for the default, the name of a preset, the path of a TOML file, or fields by section.
+        None for the default, the name of a preset, the path of a TOML file, or a dictionary of sections.
 
     Returns
     -------
     dict
-        Fields by section, as TOML has them.
+        Sections with their fields, as in TOML.
 
     Raises
     ------
     RecipeError
-        If a field cannot be what it is.
+        If a field is invalid.
     """
     from ._toml import loads
 
@@ -77,7 +77,7 @@ def recipe(recipe=None) -> dict:
 
 
 def schema() -> dict:
-    """The JSON schema of recipes: every field with its type, range, unit and meaning."""
+    """Return the JSON schema of recipes: every field with type, range, unit and meaning."""
     import json
 
     return json.loads(_recipe_schema())

@@ -1,4 +1,4 @@
-"""Measuring a microscope and its camera."""
+"""Calibration of a microscope and its camera."""
 
 from __future__ import annotations
 
@@ -27,38 +27,38 @@ def calibrate_microscope(
     immersion_index: float | None = None,
     threads: int = 0,
 ) -> dict[str, Any]:
-    """Measures the blur of a microscope on a focus stack of nuclei, on a straight edge, or on both.
+    """Measure the blur of a microscope from a focus stack of nuclei, a straight edge, or both.
 
     Parameters
     ----------
     stack : sequence of array_like, optional
-        Three planes or more, each (height, width), at equal distances and on both sides of focus. Gives the blur against
-        the distance from focus and, with ``step_um`` and ``pixel_um``, the aperture of the condenser.
+        Three or more planes, each (height, width), equally spaced, on both sides of focus. Gives the blur as a function of
+        defocus and, with ``step_um`` and ``pixel_um``, the aperture of the condenser.
     edge : array_like, optional
         An image with a straight edge in focus, (height, width). Gives the blur in focus.
     step_um : float, optional
-        Travel of the stage from plane to plane.
+        Distance between planes, µm.
     windows : sequence of (left, top, width, height), optional
-        Where nuclei lie in the stack, in pixels. By default they are found: dark, compact, sharp things.
+        Boxes around nuclei, pixels. By default dark, compact, sharp objects are detected.
     line : (x0, y0, x1, y1), optional
-        A line across the edge or along it, in pixels. By default the sharpest straight edge is found.
+        A line across the edge or along it, pixels. By default the sharpest straight edge is detected.
     pixel_um : float, optional
-        Size of a pixel in the object. Without it there are no sections of a recipe.
+        Pixel size in the object plane, µm. Required for the sections of a recipe.
     na, wavelength_um, mount_index, immersion_index : float, optional
-        What is known of the microscope; by default 0.95, 0.57 µm, 1.515 and 1, a dry lens.
+        Properties of the microscope. Default: 0.95, 0.57 µm, 1.515 and 1 (a dry objective).
     threads : int
-        0 for as many as there are processors.
+        Number of threads; 0 for all processors.
 
     Returns
     -------
     dict
-        ``microscope``, ``focus`` and ``edge``, as `papsynth calibrate` writes them to ``calibration.json``; in ``recipe``
-        the sections of a bright-field microscope, in ``recipe_gaussian`` those of the paper's Gaussians, or None.
+        ``microscope``, ``focus`` and ``edge``, as `papsynth calibrate` writes them to ``calibration.json``; ``recipe`` with the
+        sections of a bright-field microscope and ``recipe_gaussian`` with those of the paper's Gaussians, or None.
 
     Raises
     ------
     ValueError
-        If the images cannot be measured; names which, and why.
+        If an image cannot be measured; the message names the image and the reason.
 
     Examples
     --------
@@ -85,30 +85,30 @@ def calibrate_microscope(
 def calibrate_camera(
     flats: Sequence[Sequence[Any]], darks: Sequence[Any], *, bits: int | None = None
 ) -> dict[str, Any]:
-    """Measures the gain, the noise and the non-uniformity of a camera by photon transfer (EMVA 1288).
+    """Measure gain, noise and non-uniformity of a camera by photon transfer (EMVA 1288).
 
     Parameters
     ----------
     flats : sequence of sequence of array_like
-        For each level of light two frames or more of an even field, each (height, width), from near dark to the brightest.
+        For each light level two or more frames of a uniform field, each (height, width), from nearly dark to saturation.
     darks : sequence of array_like
-        Two frames or more in the dark.
+        Two or more dark frames.
     bits : int, optional
-        Bits of the camera's converter, 8 to 16; by default 8 for frames of uint8.
+        Bits of the analogue-to-digital converter, 8 to 16. Default: 8 for frames of uint8.
 
     Returns
     -------
     dict
-        ``camera``, as `papsynth calibrate` writes it to ``calibration.json``, and in ``recipe`` the section of a recipe.
+        ``camera``, as `papsynth calibrate` writes it to ``calibration.json``, and ``recipe`` with the section of a recipe.
 
     Raises
     ------
     ValueError
-        If the frames cannot be measured; names which, and why.
+        If a frame cannot be measured; the message names the frame and the reason.
     """
     darks, flats = list(darks), [list(level) for level in flats]
     if bits is None:
         if any(np.asarray(frame).dtype != np.uint8 for frame in darks):
-            raise ValueError("bits: only frames of uint8 tell the bits of the camera; expected 8 to 16")
+            raise ValueError("bits: required unless all frames are uint8; expected 8 to 16")
         bits = 8
     return json.loads(_native.calibrate_camera(flats, darks, bits))

@@ -1,4 +1,4 @@
-"""Images by index, for training loops."""
+"""Data sets for training loops."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["Dataset", "IterableDataset"]
 
 
 def _own(given: Any) -> Any:
-    """A recipe or model that nobody else changes, wherever it is read next."""
+    """Return a copy of a recipe or model, with absolute paths."""
     if hasattr(given, "to_dict"):
         given = given.to_dict()
     if isinstance(given, (str, os.PathLike)):
@@ -23,25 +23,25 @@ def _own(given: Any) -> Any:
 
 
 class Dataset:
-    """Images that are made when they are asked for.
+    """A data set that generates images on access.
 
-    The same index gives the same sample in every process, so that a ``torch.utils.data.DataLoader`` sees the same data with any number of
-    workers. It can be pickled, and says so if it was pickled by a version that would have given other images.
+    An index gives the same sample in every process, so a ``torch.utils.data.DataLoader`` returns the same data with any number
+    of workers. The data set can be pickled. Unpickling fails in a version that gives other images.
 
     Parameters
     ----------
     recipe : None, str, os.PathLike or dict
-        As of `papsynth.render`. A file is read here, and again where the data set is unpickled, which fails if it is another then.
+        As for `papsynth.render`. A file is read again when the data set is unpickled, which fails if the file has changed.
     seed : int
-        The data set.
+        Seed of the data set.
     length : int
         Number of images.
     start : int
-        Index of the first.
+        Index of the first image.
     transform : callable, optional
-        What each `Frame` becomes; by default it stays one.
+        Function of a `Frame` that returns the sample. Default: the frame.
     model : None, dict, str or os.PathLike
-        As of `papsynth.render`.
+        As for `papsynth.render`.
     """
 
     def __init__(
@@ -56,14 +56,14 @@ class Dataset:
     ) -> None:
         for name, value, least in (("seed", seed, 0), ("length", length, 1), ("start", start, 0)):
             if isinstance(value, bool) or not hasattr(value, "__index__"):
-                raise TypeError(f"{name}: {value!r} is no whole number")
+                raise TypeError(f"{name}: expected an integer, found {value!r}")
             if not least <= value.__index__() < 2**64:
-                raise ValueError(f"{name}: {value} is out of range; expected {least} to 2**64 - 1")
+                raise ValueError(f"{name}: {value} is out of range: expected {least} to 2**64 - 1")
         self.seed, self.length, self.start = seed.__index__(), length.__index__(), start.__index__()
         if self.length >= 2**63 or self.start + self.length > 2**64:
-            raise ValueError(f"start, length: {start}, {length}; expected a length below 2**63, and indices below 2**64")
+            raise ValueError(f"start, length: {start}, {length}: expected a length below 2**63 and indices below 2**64")
         if transform is not None and not callable(transform):
-            raise TypeError(f"transform: {transform!r} cannot be called")
+            raise TypeError(f"transform: expected a callable, found {transform!r}")
         self.transform = transform
         self._recipe, self._model = _own(recipe), _own(model)
         self._engine = engine(recipe, model)
@@ -73,7 +73,7 @@ class Dataset:
 
     def __getitem__(self, index: int) -> Any:
         if isinstance(index, bool) or not hasattr(index, "__index__"):
-            raise TypeError(f"index: {index!r} is no whole number")
+            raise TypeError(f"index: expected an integer, found {index!r}")
         index = index.__index__()
         if not -self.length <= index < self.length:
             raise IndexError(f"index {index} is out of range for {self.length} images")
@@ -91,20 +91,20 @@ class Dataset:
         made_by = state.pop("_made_by", None)
         if made_by != _native.identity():
             raise ValueError(
-                f"this data set was pickled by papsynth {made_by}, whose images are others than those of {_native.identity()}"
+                f"this data set was pickled by papsynth {made_by}, which gives other images than {_native.identity()}"
             )
         identity = state.pop("_identity", None)
         vars(self).update(state)
         self._engine = engine(self._recipe, self._model)
         if self._engine.identity != identity:
-            raise ValueError("the files of this data set's recipe or model are others now than when it was made")
+            raise ValueError("the recipe or model file of this data set has changed since it was pickled")
 
     def __repr__(self) -> str:
         return f"<papsynth.Dataset of {self.length} images, seed {self.seed}>"
 
 
 class IterableDataset:
-    """The same, one after the other and shared between the workers of a loader: worker k of n makes every n-th.
+    """Iterates over a `Dataset`. Worker k of n of a ``DataLoader`` returns every n-th sample.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class IterableDataset:
 
     def __init__(self, dataset: Dataset) -> None:
         if not isinstance(dataset, Dataset):
-            raise TypeError(f"dataset: {dataset!r} is no papsynth.Dataset")
+            raise TypeError(f"dataset: expected a papsynth.Dataset, found {dataset!r}")
         self.dataset = dataset
 
     def __len__(self) -> int:

@@ -1,42 +1,42 @@
-"""What can be wrong with a recipe."""
+"""Errors of recipes."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 
-class Fault(NamedTuple):
-    """One thing that is wrong with a recipe."""
+class FieldError(NamedTuple):
+    """An invalid field of a recipe."""
 
     field: str
-    """The field, from the top, such as ``"optics.na"``; empty if the text is no TOML."""
+    """Path of the field, such as ``"optics.na"``; empty if the text is not valid TOML."""
     message: str
-    """What is wrong with it, its value included."""
+    """The problem, with the value."""
     help: str | None
-    """What would be accepted, or what may have been meant."""
+    """Accepted values or similar names, if any."""
 
 
 class RecipeError(ValueError):
-    """A recipe asks for what cannot be.
+    """Raised for invalid recipes.
 
     Attributes
     ----------
     source : str
-        The file, or what else the recipe came from.
-    faults : list of Fault
-        Everything that is wrong, in the order of the text.
+        The file or preset of the recipe.
+    errors : list of FieldError
+        All invalid fields, in the order of the text.
     field : str
-        The field of the first fault.
+        The first invalid field.
     """
 
-    def __init__(self, source: str, faults: list[tuple[str, str, str | None]]) -> None:
+    def __init__(self, source: str, errors: list[tuple[str, str, str | None]]) -> None:
         self.source = source
-        self.faults = [Fault(*fault) for fault in faults]
-        self.field = self.faults[0].field if self.faults else ""
-        lines = [f"{fault.message}" + (f" ({fault.help})" if fault.help else "") for fault in self.faults[:12]]
-        if len(self.faults) > 12:
-            lines.append(f"and {len(self.faults) - 12} more")
+        self.errors = [FieldError(*error) for error in errors]
+        self.field = self.errors[0].field if self.errors else ""
+        lines = [error.message + (f" ({error.help})" if error.help else "") for error in self.errors[:12]]
+        if len(self.errors) > 12:
+            lines.append(f"and {len(self.errors) - 12} more")
         super().__init__(f"{source}: " + "; ".join(lines))
 
     def __reduce__(self):
-        return type(self), (self.source, [tuple(fault) for fault in self.faults])
+        return type(self), (self.source, [tuple(error) for error in self.errors])

@@ -1,4 +1,4 @@
-"""Learning from real material, and judging against it."""
+"""Learning classes from real images, and comparing synthetic with real fields."""
 
 from __future__ import annotations
 
@@ -26,36 +26,36 @@ def learn(
     numbers_only: bool = False,
     model: Any = None,
 ) -> dict[str, Any]:
-    """Learns a class of cells from images of nuclei and from outlines.
+    """Learn a class of cells from images of nuclei and from outlines.
 
     Parameters
     ----------
     name : str
-        Of the class: one of the model's, which is learned anew, or another.
+        Name of the class. A class of the model with this name is replaced.
     pixel_um : float
-        Size of a pixel of all the material, 0.05 to 4.
+        Pixel size of all images and outlines, 0.05 to 4 µm.
     nuclei : sequence of (array_like, array_like), optional
-        Images of transmitted light with their masks, each (height, width).
+        Bright-field images with their masks, each (height, width).
     nucleus_outlines, cytoplasm_outlines : sequence of array_like, optional
-        Each (points, 2), pixels. Without outlines of nuclei those of the masks are taken.
+        Outlines, each (points, 2), pixels. By default the nuclear outlines are those of the masks.
     like : str, optional
-        Class that it takes after in everything the material does not show; by default the one of its name.
+        Class that supplies all other properties. Default: the class of the same name.
     bethesda, source : str
-        Category of the Bethesda system, and where the material came from.
+        Bethesda category, and origin of the images.
     numbers_only : bool
-        Whether the model holds no textures, so that nothing of a real cell can be seen in it.
+        Store statistics only, no textures of real cells.
     model : None, dict, str or os.PathLike
-        What the class is added to; by default the model that ships.
+        Model to extend. Default: the built-in model.
 
     Returns
     -------
     dict
-        The model, for ``papsynth.render(..., model=...)``, or for a file by `json.dump`.
+        The model, for ``papsynth.render(..., model=...)`` or `json.dump`.
 
     Raises
     ------
     ValueError
-        If the material is too little or cannot be used; names which.
+        If there are too few images or outlines, or one cannot be used; the message names it.
     """
 
     def listed(values):
@@ -89,27 +89,29 @@ def judge(
     quick: bool = False,
     threads: int = 0,
 ) -> dict[str, Any]:
-    """Tells synthetic fields from real ones, and says by what.
+    """Compare synthetic with real fields.
 
     Parameters
     ----------
     real, synthetic : sequence of array_like
-        Fields in grey, each (height, width), of one size of pixels; at least two of each.
+        Grey fields, each (height, width), of the same pixel size; at least two of each.
     pixel_um : float
+        Pixel size, µm.
     full_scale : float, optional
-        The grey level of a saturated pixel; by default that of the type, 255 for uint8.
+        Grey level of a saturated pixel. Default: the maximum of the integer type, 1 for floats.
     real_nuclei, synthetic_nuclei : sequence of array_like, optional
-        Middles of the nuclei of each field, (n, 2): x and y in pixels. Without them nuclei are searched for.
+        Centres of the nuclei of each field, (n, 2): x and y in pixels. By default nuclei are detected.
     seed : int
+        Seed of the classifier.
     quick : bool
-        Whether a first look is enough, five times as quick.
+        Five times as fast, with fewer trees and repetitions.
     threads : int
-        0 for as many as there are processors. The numbers are the same.
+        Number of threads; 0 for all processors. The result does not depend on it.
 
     Returns
     -------
     dict
-        What `papsynth judge` writes as ``report.json``.
+        The content of ``report.json`` of `papsynth judge`.
     """
     if full_scale is None:
         kind = np.asarray(real[0]).dtype if len(real) else np.dtype(float)

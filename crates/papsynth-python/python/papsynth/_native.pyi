@@ -75,7 +75,7 @@ def generate(
     frames: int,
     seed: int = 0,
     *,
-    shard: tuple[int, int] = (0, 1),
+    task: tuple[int, int] = (0, 1),
     formats: list[str] | None = None,
     frames_per_shard: int | None = None,
     scenes: bool = False,

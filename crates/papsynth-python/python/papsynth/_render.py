@@ -1,4 +1,4 @@
-"""One image at a time."""
+"""Rendering of single images."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from threading import Lock
 
 from . import _native
 
-# Engines that were used last: making one takes longer than many an image.
-_MOST = 4
+# Cache of recently used engines: creating one takes longer than rendering a small image.
+_CACHE_SIZE = 4
 _engines: OrderedDict[object, _native.Engine] = OrderedDict()
 _lock = Lock()
 
 
 def _after_fork() -> None:
-    """What another thread of the parent held while it was forked is not held by anybody here."""
+    """Replace the lock, which another thread of the parent may have held during the fork."""
     global _lock
     _lock = Lock()
     _native._after_fork()
@@ -27,7 +27,7 @@ if hasattr(os, "register_at_fork"):
 
 
 def _key(recipe, model):
-    """What tells engines apart, or nothing if it cannot be said."""
+    """Return the cache key of an engine, or None if it cannot be cached."""
 
     def of_file(path):
         path = os.path.abspath(os.fspath(path))
@@ -50,7 +50,7 @@ def _key(recipe, model):
 
 
 def engine(recipe=None, model=None) -> _native.Engine:
-    """The engine of a recipe: the one of last time, if it is the same."""
+    """Return the engine of a recipe, cached if possible."""
     key = _key(recipe, model)
     if key is None:
         return _native.Engine(recipe, model)
@@ -58,52 +58,53 @@ def engine(recipe=None, model=None) -> _native.Engine:
         if key in _engines:
             _engines.move_to_end(key)
             return _engines[key]
-    made = _native.Engine(recipe, model)
-    if made.names_files:
-        # They may be others next time.
-        return made
+    new = _native.Engine(recipe, model)
+    if new.names_files:
+        # The files may change.
+        return new
     with _lock:
-        _engines[key] = made
-        while len(_engines) > _MOST:
+        _engines[key] = new
+        while len(_engines) > _CACHE_SIZE:
             _engines.popitem(last=False)
-    return made
+    return new
 
 
 def render(recipe=None, seed: int = 0, index: int = 0, *, model=None, threads: int = 1, scene=None) -> _native.Frame:
-    """Makes an image or focus stack, and its truth.
+    """Render an image or focus stack with its ground truth.
 
     Parameters
     ----------
     recipe : None, str, os.PathLike or dict
-        Nothing for the default, the name of a preset, the path of a TOML file, or fields by section; what is left out is the default.
+        None for the default, the name of a preset, the path of a TOML file, or a dictionary of sections. Omitted fields
+        have their defaults.
     seed : int
-        The data set, 0 to 2**64 - 1.
+        Seed of the data set, 0 to 2**64 - 1.
     index : int
-        The image in it, 0 to 2**64 - 1.
+        Index of the image, 0 to 2**64 - 1.
     model : None, dict, str or os.PathLike
-        A model, such as `papsynth.learn` returns, or the path of a model or class file, laid over the model that ships.
+        A model, such as `papsynth.learn` returns, or the path of a model or class file; extends the built-in model.
     threads : int
-        Threads that work on it; 0 for as many as there are processors. The bytes are the same.
+        Number of threads; 0 for all processors. The result does not depend on it.
     scene : None, dict, str or os.PathLike
-        A scene to image in place of the one of seed and index: as `Engine.scene` returns it, perhaps changed, or the path of a
+        Scene to render instead of the one of seed and index: a dictionary such as `Engine.scene` returns, or the path of a
         JSON file that ``papsynth generate --scenes`` wrote.
 
     Returns
     -------
     Frame
-        Its ``image``, ``stack``, ``labels``, ``masks``, ``table``, ``noise_free`` and more.
+        With ``image``, ``stack``, ``labels``, ``masks``, ``table``, ``noise_free`` and more.
 
     Raises
     ------
     RecipeError
-        If a field of the recipe cannot be what it is; ``field`` names it.
+        If a field of the recipe is invalid; ``field`` names it.
     OSError
         If a file cannot be read.
     MemoryError
-        If a frame of the recipe may need more memory than there is, where the system tells.
+        If a frame may need more memory than is available.
     ValueError
-        If the scene cannot be drawn or is not valid, or the model cannot be used.
+        If the scene or the model is invalid.
     OverflowError, TypeError
-        If seed or index are no whole numbers in their range.
+        If seed or index is not an integer in its range.
     """
     return engine(recipe, model).render(seed, index, threads=threads, scene=scene)

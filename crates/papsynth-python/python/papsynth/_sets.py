@@ -1,4 +1,4 @@
-"""Data sets on the disk, as the command line makes them."""
+"""Data sets in files, the same as those of the command line."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["generate", "merge", "missing", "verify"]
 
 
 def place(out: str | os.PathLike[str]) -> str:
-    """A folder as every process finds it; the address of an object store as it is."""
+    """Return the absolute path of a folder; addresses of object stores stay as they are."""
     out = os.fspath(out)
     return out if "://" in out else os.path.abspath(out)
 
@@ -23,50 +23,50 @@ def _list(formats: str | Sequence[str] | None) -> list[str] | None:
     return [formats] if isinstance(formats, str) else None if formats is None else list(formats)
 
 
-def written(recipe: Any, frames: int, options: dict[str, Any]) -> int:
-    """Number of shards that are written. Whatever is wrong with the recipe or the options is raised here, before a cluster is begun."""
+def shard_count(recipe: Any, frames: int, options: dict[str, Any]) -> int:
+    """Return the number of shards. Raises errors of recipe and options before a cluster starts."""
     if unknown := set(options) - {"formats", "frames_per_shard", "threads", "verify", "model"}:
-        raise TypeError(f"{', '.join(sorted(unknown))}: not known; expected formats, frames_per_shard, threads, verify or model")
+        raise TypeError(f"{', '.join(sorted(unknown))}: unknown option; expected formats, frames_per_shard, threads, verify or model")
     engine(recipe, options.get("model"))
     return _native.shards(frames, _list(options.get("formats")), options.get("frames_per_shard"))
 
 
-def tasks(written: int, frames: int, workers: int, shards: int | None) -> int:
-    """Into how many tasks a cluster divides so many shards: one each, but tasks of 64 frames at least where there are more of them than
-    four a worker, unless the number is said."""
-    if shards is not None and shards < 1:
-        raise ValueError(f"shards: {shards}; expected 1 or more")
-    return min(written, max(4 * workers, frames // 64, 1) if shards is None else shards)
+def task_count(shards: int, frames: int, workers: int, tasks: int | None) -> int:
+    """Return the number of tasks of a cluster run. Default: one per shard, but at least 64 frames per task where that leaves
+    four tasks per worker."""
+    if tasks is not None and tasks < 1:
+        raise ValueError(f"tasks: {tasks} is out of range: expected 1 or more")
+    return min(shards, max(4 * workers, frames // 64, 1) if tasks is None else tasks)
 
 
-class Told:
-    """Tells, now and then, how many shards are whole, by their commit records."""
+class ProgressReporter:
+    """Reports the number of complete shards, from their commit records."""
 
-    def __init__(self, out: str, frames: int, written: int, progress: Callable[[int, int], object] | None):
-        self._out, self._frames, self._written, self._progress = out, frames, written, progress
+    def __init__(self, out: str, frames: int, shards: int, progress: Callable[[int, int], object] | None):
+        self._out, self._frames, self._shards, self._progress = out, frames, shards, progress
         self._last, self._next = -1, time.monotonic()
 
-    def now_and_then(self) -> None:
+    def update(self) -> None:
         if self._progress is None or time.monotonic() < self._next:
             return
-        begun = time.monotonic()
+        started = time.monotonic()
         try:
-            whole = self._written - len(missing(self._out, self._frames))
+            complete = self._shards - len(missing(self._out, self._frames))
         except (ValueError, OSError):
-            # Before the first task there is no data set. What else is wrong is said by whoever needs it.
-            whole = 0
-        self._tell(whole)
-        # However many records there are, reading them takes no more than a twentieth of the time.
+            # The data set does not exist before the first task; other errors are raised by the tasks.
+            complete = 0
+        self._report(complete)
+        # Reading the records takes at most a twentieth of the time.
         ended = time.monotonic()
-        self._next = ended + max(1.0, 20 * (ended - begun))
+        self._next = ended + max(1.0, 20 * (ended - started))
 
     def finish(self) -> None:
-        self._tell(self._written)
+        self._report(self._shards)
 
-    def _tell(self, whole: int) -> None:
-        if self._progress is not None and whole != self._last:
-            self._last = whole
-            self._progress(whole, self._written)
+    def _report(self, complete: int) -> None:
+        if self._progress is not None and complete != self._last:
+            self._last = complete
+            self._progress(complete, self._shards)
 
 
 def generate(
@@ -75,7 +75,7 @@ def generate(
     frames: int,
     seed: int = 0,
     *,
-    shard: tuple[int, int] = (0, 1),
+    task: tuple[int, int] = (0, 1),
     formats: str | Sequence[str] | None = None,
     frames_per_shard: int | None = None,
     scenes: bool = False,
@@ -84,58 +84,58 @@ def generate(
     model: Any = None,
     progress: Callable[[int], object] | None = None,
 ) -> dict[str, int]:
-    """Makes the frames of a data set that are not whole there, or a part of them.
+    """Generate the missing frames of a data set, or those of one task.
 
-    Killed and called again it goes on; several processes may work on the same folder. `merge` closes the data set.
+    A repeated call continues an interrupted one. Several processes may write the same folder. `merge` completes the data set.
 
     Parameters
     ----------
     recipe : None, str, os.PathLike or dict
-        As of `papsynth.render`.
+        As for `papsynth.render`.
     out : str or os.PathLike
-        New, empty, or a data set of the same recipe, seed and formats: a folder, or an object store (``s3://bucket/prefix``, ``gs://``,
-        ``az://``) with keys in the environment.
+        A folder or an object store (``s3://bucket/prefix``, ``gs://``, ``az://``, with keys in the environment): new, empty, or
+        a data set of the same recipe, seed and formats.
     frames : int
-        Frames that there will be in all, by all parts.
+        Total number of frames, of all tasks.
     seed : int
-    shard : tuple of int
-        (i, n), as of `--shard i/n`: every n-th shard from the i-th on; n processes with i from 0 to n - 1 make all.
+        Seed of the data set.
+    task : tuple of int
+        (i, n), as for `--task i/n`: every n-th shard, starting with the i-th, i from 0 to n - 1.
     formats : str or list of str
-        Such as ``"folder"`` (the default) or ``"webdataset"``.
+        For example ``"webdataset"``. Default: ``"folder"``.
     frames_per_shard : int, optional
-        Frames that are written and made again together.
+        Number of frames per shard.
     scenes : bool
-        Whether the scene of each frame is written too, as ``scenes/NNNNNN.json``, which `papsynth.render` reads.
+        Also write the scene of each frame to ``scenes/NNNNNN.json``, which `papsynth.render` reads.
     threads : int
-        Frames that are made side by side.
+        Number of frames rendered in parallel.
     verify : bool
-        Whether files that are there are read, rather than their sizes compared.
+        Check the hashes of existing files, not only their sizes.
     model : None, dict, str or os.PathLike
-        As of `papsynth.render`.
+        As for `papsynth.render`.
     progress : callable, optional
-        Called with the index of each frame that is done.
+        Called with the index of each finished frame.
 
     Returns
     -------
     dict
-        Numbers of frames that were ``"kept"`` and ``"made"``.
+        Numbers of frames ``"written"`` and already ``"present"``.
 
     Raises
     ------
     RecipeError
-        If a field of the recipe cannot be what it is.
+        If a field of the recipe is invalid.
     OSError
-        If the system refuses to write; what is written is whole, and the same call goes on.
+        If a file cannot be written. Written files are complete, and the same call continues.
     ValueError
-        If the folder holds something else.
+        If the folder contains something else.
     """
-    made_by = engine(recipe, model)
     return _native.generate(
-        made_by,
+        engine(recipe, model),
         os.fspath(out),
         frames,
         seed,
-        shard=tuple(shard),
+        task=tuple(task),
         formats=_list(formats),
         frames_per_shard=frames_per_shard,
         scenes=scenes,
@@ -146,35 +146,35 @@ def generate(
 
 
 def merge(out: str | os.PathLike[str], frames: int) -> str:
-    """Closes a data set: fails on any gap, writes the files about all frames.
+    """Complete a data set: write the files about all frames.
 
     Returns
     -------
     str
-        The root hash: two data sets of one root hash are the same.
+        The root hash. Equal root hashes mean equal data sets.
 
     Raises
     ------
     ValueError
-        If shards are missing, which are named, or there is no data set.
+        If shards are missing (the message lists them), or there is no data set.
     OSError
-        If the system refuses to read or write.
+        If a file cannot be read or written.
     """
     return _native.merge(os.fspath(out), frames)
 
 
 def missing(out: str | os.PathLike[str], frames: int) -> list[int]:
-    """Numbers of the shards that are not whole, from commit records: also while others work."""
+    """Return the numbers of the missing shards, from commit records; also while other processes write."""
     return _native.missing(os.fspath(out), frames)
 
 
 def verify(out: str | os.PathLike[str], frames: int | None = None) -> dict[str, Any]:
-    """Reads every file of a data set and says what is wrong.
+    """Check every file of a data set.
 
     Returns
     -------
     dict
-        ``"root"``, the root hash of a data set that is whole, else None; numbers of ``"frames"`` and ``"files"``; ``"findings"``, a list of
-        (file, what is wrong with it).
+        ``"root"``, the root hash of a complete data set, else None; the numbers of ``"frames"`` and ``"files"``; ``"findings"``, a
+        list of (file, message).
     """
     return _native.verify(os.fspath(out), frames)

@@ -1,4 +1,4 @@
-"""Truth as detectors of torchvision are trained with it."""
+"""Training targets for torchvision."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ __all__ = ["detection_target"]
 
 
 def detection_target(frame: Any, part: str = "nucleus", classes: Sequence[str] | None = None) -> dict[str, np.ndarray]:
-    """The truth of a frame as torchvision's detectors take it, in arrays: ``torch.from_numpy`` makes tensors of them.
+    """Return the ground truth of a frame as a target of torchvision's detectors, in NumPy arrays.
 
     Parameters
     ----------
     frame : Frame
     part : str
-        "nucleus", "cytoplasm" or "whole": what is to be found.
+        "nucleus", "cytoplasm" or "whole" (debris): the part to detect.
     classes : sequence of str, optional
-        Names of classes; a label is the place in this list, from 1 on, and objects of other classes are left out. By default
-        all are 1.
+        Class names. A label is the position in this list, from 1; objects of other classes are omitted. By default all
+        labels are 1.
 
     Returns
     -------
@@ -31,13 +31,13 @@ def detection_target(frame: Any, part: str = "nucleus", classes: Sequence[str] |
     Raises
     ------
     ValueError
-        If there is no such part.
+        If the part or the list of classes is invalid.
     """
     parts = ("nucleus", "cytoplasm", "whole")
     if part not in parts:
         raise ValueError(f"part: {part!r}; expected one of {', '.join(parts)}")
     if isinstance(classes, str) or (classes is not None and len(set(classes)) < len(list(classes))):
-        raise ValueError(f"classes: {classes!r}; expected a list of different names")
+        raise ValueError(f"classes: {classes!r}; expected a list of unique names")
     table = frame.table
     chosen = (table["part"] == part) & (table["area_px"] > 0)
     labels = np.ones(len(chosen), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Cells as cloth that is pressed into their outline."""
+"""Cloth simulation of cytoplasm."""
 
 from ._native import cloth as _cloth
 

@@ -1,4 +1,4 @@
-"""Cytoskeletons."""
+"""Cytoskeletons on Voronoi diagrams."""
 
 from ._native import cytoskeleton as _cytoskeleton
 

@@ -1,4 +1,4 @@
-"""Data sets made by a Dask cluster: a task a part of the shards."""
+"""Generation of data sets on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ __all__ = ["generate"]
 _RETRIES = 20
 
 
-def _part(recipe, out, frames, seed, shard, options):
-    _sets.generate(recipe, out, frames, seed, shard=shard, **options)
+def _task(recipe, out, frames, seed, task, options):
+    _sets.generate(recipe, out, frames, seed, task=task, **options)
 
 
 def generate(
@@ -25,27 +25,27 @@ def generate(
     seed: int = 0,
     *,
     client: Any = None,
-    shards: int | None = None,
+    tasks: int | None = None,
     progress: Callable[[int, int], object] | None = None,
     **options: Any,
 ) -> str:
-    """Makes a data set in a folder that all workers share, or in an object store whose keys they have, and closes it.
+    """Generate and complete a data set in a folder that all workers share, or in an object store whose keys they have.
 
-    Tasks are tried again when their worker dies or the system refuses to write; the same call goes on with what there is.
+    Tasks are retried if their worker dies or a file cannot be written. The same call continues an interrupted one.
 
     Parameters
     ----------
     recipe, out, frames, seed
-        As of `papsynth.generate`.
+        As for `papsynth.generate`.
     client : dask.distributed.Client, optional
-        By default the one of this process, or a cluster on this machine.
-    shards : int, optional
-        Into how many parts the work is divided, a task each, as n of `--shard i/n`; by default one for each shard that is written, but of
-        64 frames at least where that leaves each thread four.
+        Default: the client of this process, or a local cluster.
+    tasks : int, optional
+        Number of tasks, as n of `--task i/n`. Default: one per shard, but at least 64 frames per task where that leaves four
+        tasks per thread.
     progress : callable, optional
-        Called with the number of shards that are written whole, and of all, from commit records: what was there before counts.
+        Called with the number of complete shards and their total number, including shards of earlier calls.
     **options
-        As of `papsynth.generate`: formats, frames_per_shard, scenes, threads, verify, model.
+        As for `papsynth.generate`: formats, frames_per_shard, scenes, threads, verify, model.
 
     Returns
     -------
@@ -56,9 +56,9 @@ def generate(
         from dask.distributed import Client, get_client
     except ModuleNotFoundError as error:
         raise ModuleNotFoundError("papsynth.dask needs Dask: pip install 'papsynth[dask]'", name="dask") from error
-    # What is wrong is said before a cluster is begun.
-    written = _sets.written(recipe, frames, options)
-    _sets.tasks(written, frames, 1, shards)
+    # Raises errors before a cluster starts.
+    shards = _sets.shard_count(recipe, frames, options)
+    _sets.task_count(shards, frames, 1, tasks)
     own = None
     if client is None:
         try:
@@ -67,23 +67,23 @@ def generate(
             client = own = Client()
     try:
         out = _sets.place(out)
-        told = _sets.Told(out, frames, written, progress)
-        parts = _sets.tasks(written, frames, max(1, sum(client.nthreads().values())), shards)
-        # Names of their own: a task of another call is never taken for one of these.
-        tasks = [
-            client.submit(_part, recipe, out, frames, seed, (part, parts), options, retries=_RETRIES, pure=False)
-            for part in range(parts)
+        reporter = _sets.ProgressReporter(out, frames, shards, progress)
+        tasks = _sets.task_count(shards, frames, max(1, sum(client.nthreads().values())), tasks)
+        # `pure=False`: Dask must not reuse the result of a task of another call.
+        futures = [
+            client.submit(_task, recipe, out, frames, seed, (task, tasks), options, retries=_RETRIES, pure=False)
+            for task in range(tasks)
         ]
         try:
-            while progress is not None and not all(task.done() for task in tasks):
-                told.now_and_then()
+            while progress is not None and not all(future.done() for future in futures):
+                reporter.update()
                 time.sleep(0.2)
-            client.gather(tasks)
+            client.gather(futures)
         except BaseException:
-            # One that cannot be made ends all: nobody waits for the others.
-            client.cancel(tasks)
+            # The first failed task cancels the others.
+            client.cancel(futures)
             raise
-        told.finish()
+        reporter.finish()
     finally:
         if own is not None:
             own.close()

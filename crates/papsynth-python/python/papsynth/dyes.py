@@ -1,4 +1,4 @@
-"""The colours of dyes."""
+"""Colours of dyes."""
 
 from ._native import dyes as _dyes
 

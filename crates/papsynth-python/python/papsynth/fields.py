@@ -1,4 +1,4 @@
-"""Random fields, and noise of backgrounds."""
+"""Random fields and Perlin noise."""
 
 from ._native import fields as _fields
 

@@ -1,4 +1,4 @@
-"""Outlines as Fourier shape descriptors."""
+"""Fourier shape descriptors of outlines."""
 
 from ._native import fsd as _fsd
 

@@ -1,4 +1,4 @@
-"""Noise of a camera: what it makes of light."""
+"""Camera model of EMVA 1288."""
 
 from ._native import noise as _noise
 

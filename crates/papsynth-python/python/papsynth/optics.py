@@ -1,4 +1,4 @@
-"""How a microscope spreads light."""
+"""Microscope optics."""
 
 from ._native import optics as _optics
 

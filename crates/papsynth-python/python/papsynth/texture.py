@@ -1,4 +1,4 @@
-"""Textures from pieces of others."""
+"""Patch-based texture synthesis."""
 
 from ._native import texture as _texture
 

@@ -1,10 +1,10 @@
 "use strict";
 
-// What all pages share: they are loaded after this.
+// Functions of all pages; loaded first.
 
 const element = (id) => document.getElementById(id);
 
-/** Asks the server. Throws what it says against that, with its status; without a status if it does not answer. */
+/** Sends a request. Throws the message of the server with its status, or an error without a status if it does not respond. */
 async function request(path, body) {
   const options = { cache: "no-store" };
   if (body !== undefined) {
@@ -18,5 +18,5 @@ async function request(path, body) {
   throw Object.assign(new Error(error), { status: response.status });
 }
 
-/** A number with a minus that is as wide as a digit, and none before zero. */
+/** Formats a number with a typographic minus sign, and without one before zero. */
 const minus = (value, digits) => (Number(value.toFixed(digits)) || 0).toFixed(digits).replace("-", "−");

@@ -1,96 +1,96 @@
-//! What is asked and what is answered.
+//! Requests and replies.
 
 use std::borrow::Cow;
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// Longest body of a request, bytes.
-pub const LONGEST_BODY: usize = 4096;
+/// Maximum length of a request body, bytes.
+pub const MAX_BODY: usize = 4096;
 
-/// The type of JSON.
+/// Content type of JSON.
 pub const JSON: &str = "application/json";
 
-/// A request, without what does not matter.
+/// The parts of a request that a site needs.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Request<'a> {
-    /// "GET", "POST", …, as it stands in the request line.
+    /// HTTP method: "GET", "POST", ….
     pub method: &'a str,
-    /// The target as it stands in the request line: a path, and a query if there is one. Nothing is decoded.
+    /// Path and query, not decoded.
     pub target: &'a str,
-    /// The type of the body.
+    /// Content type of the body.
     pub content_type: Option<&'a [u8]>,
-    /// The body of a POST, at most [`LONGEST_BODY`] bytes; of all else nothing.
+    /// Body of a POST request, at most [`MAX_BODY`] bytes; empty for other methods.
     pub body: &'a [u8],
 }
 
 impl Request<'_> {
-    /// The body of a request. It has to say that it is JSON, which browsers let no page from elsewhere say unasked.
+    /// Parses the body as JSON. The content type must be JSON: browsers do not let pages of other sites send it without asking.
     ///
     /// # Errors
-    /// What to reply if it is of another type, too long, or not what is expected.
+    /// The reply for a body of another type, a body that is too long, or invalid JSON.
     pub fn json<T: DeserializeOwned>(&self) -> Result<T, Reply> {
         if self.content_type != Some(JSON.as_bytes()) {
-            return Err(Reply::refusal(415, "application/json is expected"));
+            return Err(Reply::error(415, "expected content type application/json"));
         }
-        if self.body.len() > LONGEST_BODY {
-            return Err(Reply::refusal(413, "that is too long"));
+        if self.body.len() > MAX_BODY {
+            return Err(Reply::error(413, "the request body is too long"));
         }
-        serde_json::from_slice(self.body).map_err(|error| Reply::refusal(400, &error.to_string()))
+        serde_json::from_slice(self.body).map_err(|error| Reply::error(400, &error.to_string()))
     }
 }
 
-/// A reply. All carry the same headers but for the type and length of their body.
+/// A reply. All replies have the same headers except for the type and length of the body.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reply {
-    /// Status code of HTTP.
+    /// HTTP status code.
     pub status: u16,
-    /// The type of the body.
+    /// Content type of the body.
     pub content_type: &'static str,
     /// The body.
     pub body: Cow<'static, [u8]>,
-    /// What is allowed, where something else was asked.
+    /// Allowed method, if the request used another one.
     pub allow: Option<&'static str>,
 }
 
 impl Reply {
-    /// A text that is part of the program.
+    /// Returns a file that is compiled into the program.
     #[must_use]
     pub fn page(content_type: &'static str, text: &'static str) -> Self {
         Self { status: 200, content_type, body: text.as_bytes().into(), allow: None }
     }
 
-    /// A value as JSON; a refusal if it has none.
+    /// Returns a value as JSON, or status 500 if it cannot be serialised.
     #[must_use]
     pub fn json(value: &impl Serialize) -> Self {
         match serde_json::to_vec(value) {
             Ok(body) => Self { status: 200, content_type: JSON, body: body.into(), allow: None },
-            Err(error) => Self::refusal(500, &error.to_string()),
+            Err(error) => Self::error(500, &error.to_string()),
         }
     }
 
-    /// A PNG file.
+    /// Returns a PNG file.
     #[must_use]
     pub fn png(file: Vec<u8>) -> Self {
         Self { status: 200, content_type: "image/png", body: file.into(), allow: None }
     }
 
-    /// Why there is no other reply: `{"error": message}`.
+    /// Returns an error as JSON: `{"error": message}`.
     #[must_use]
-    pub fn refusal(status: u16, message: &str) -> Self {
+    pub fn error(status: u16, message: &str) -> Self {
         let body = serde_json::json!({ "error": message }).to_string().into_bytes();
         Self { status, content_type: JSON, body: body.into(), allow: None }
     }
 
-    /// The refusal of a method where another one is allowed.
+    /// Returns status 405 with the allowed method.
     #[must_use]
-    pub fn method(allow: &'static str) -> Self {
-        Self { allow: Some(allow), ..Self::refusal(405, "this is asked for otherwise") }
+    pub fn wrong_method(allow: &'static str) -> Self {
+        Self { allow: Some(allow), ..Self::error(405, &format!("expected method {allow}")) }
     }
 }
 
 impl From<papsynth_dataset::Error> for Reply {
     fn from(error: papsynth_dataset::Error) -> Self {
-        Self::refusal(500, &error.to_string())
+        Self::error(500, &error.to_string())
     }
 }

@@ -1,14 +1,14 @@
-//! HTTP on 127.0.0.1, for pages of this machine alone.
+//! An HTTP server on 127.0.0.1.
 
-mod gate;
 mod message;
+mod origin;
 
 use std::convert::Infallible;
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use http_body_util::{BodyExt, Full, Limited};
 use hyper::body::{Body, Bytes, Incoming};
@@ -20,26 +20,26 @@ use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::sync::Semaphore;
 
 use crate::error::Error;
-use gate::Gate;
-pub use message::{JSON, LONGEST_BODY, Reply, Request};
+pub use message::{JSON, MAX_BODY, Reply, Request};
+use origin::OriginCheck;
 
-/// How often it is looked whether the server is to end.
-const LOOK: Duration = Duration::from_millis(100);
+/// Interval at which the stop flag is checked.
+const POLL: Duration = Duration::from_millis(100);
 
-/// How long a request may take to arrive.
-const PATIENCE: Duration = Duration::from_secs(10);
+/// Time limit for receiving a request.
+const REQUEST_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Connections at a time; a browser opens six.
-const CONNECTIONS: usize = 32;
+/// Maximum number of simultaneous connections; a browser opens six.
+const MAX_CONNECTIONS: usize = 32;
 
-/// Longest head of a request, bytes.
-const LONGEST_HEAD: usize = 16 * 1024;
+/// Maximum length of a request head, bytes.
+const MAX_HEAD: usize = 16 * 1024;
 
 /// Content security policy: the page loads from its own server only, and no other page may embed it.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; \
      base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// Headers of every reply, beside that nothing is kept by the browser.
+/// Headers of every reply, in addition to `Cache-Control: no-store`.
 const HEADERS: [(&str, &str); 5] = [
     ("content-security-policy", POLICY),
     ("cross-origin-opener-policy", "same-origin"),
@@ -48,26 +48,26 @@ const HEADERS: [(&str, &str); 5] = [
     ("x-content-type-options", "nosniff"),
 ];
 
-/// What is served.
+/// A site that answers requests.
 pub trait Site {
-    /// What is answered to a request, which comes from a page of this server or from no page at all. Requests are answered one after the other.
+    /// Returns the reply to a request. Requests from pages of other sites are rejected before. Calls are sequential.
     fn reply(&mut self, request: &Request) -> Reply;
 }
 
-/// What is served, and who gets to it.
+/// State that all connections share.
 struct Shared<S> {
-    gate: Gate,
+    origin: OriginCheck,
     site: Mutex<S>,
 }
 
 impl<S: Site> Shared<S> {
-    /// A site that panicked in the middle of an answer has to be fit for the next one by itself: one request does not end a server.
+    /// Returns the site, also after a panic in an earlier request: one request must not stop the server.
     fn site(&self) -> MutexGuard<'_, S> {
         self.site.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// A place on 127.0.0.1 that a site is served at.
+/// A listening socket on 127.0.0.1.
 #[derive(Debug)]
 pub struct Server {
     listener: TcpListener,
@@ -75,11 +75,14 @@ pub struct Server {
 }
 
 impl Server {
-    /// Listens at a port of 127.0.0.1, or at any free one if it is 0.
+    /// Listens on a port of 127.0.0.1, or on any free port if `port` is 0.
     ///
     /// # Errors
-    /// If the port is taken, or not allowed.
+    /// If the port is in use or not permitted, or the system clock is outside the years 1970 to 9999.
     pub fn bind(port: u16) -> Result<Self, Error> {
+        if !is_http_date(now()) {
+            return Err(Error::Clock);
+        }
         let bind = || {
             let listener = TcpListener::bind(SocketAddr::from((Ipv4Addr::LOCALHOST, port)))?;
             listener.set_nonblocking(true)?;
@@ -89,10 +92,10 @@ impl Server {
         bind().map_err(|source| Error::Listen { port, source })
     }
 
-    /// Listens at the port of last time, if it is still free, so that an open page goes on; else at any.
+    /// Listens on the previous port if it is free, so that an open page reconnects, and else on any free port.
     ///
     /// # Errors
-    /// If no port can be listened at.
+    /// If no port is available.
     pub fn bind_near(port: u16) -> Result<Self, Error> {
         Self::bind(port).or_else(|_| Self::bind(0))
     }
@@ -109,23 +112,23 @@ impl Server {
         format!("http://127.0.0.1:{}/", self.port)
     }
 
-    /// Serves a site until `stop` is set. `look` sees the site ten times a second at least, and a last time when `stop` is set.
+    /// Serves a site until `stop` is set. Calls `poll` with the site at least ten times a second, and once more when `stop` is set.
     ///
     /// # Errors
-    /// If the system refuses what serving takes.
+    /// If the runtime or the socket fails.
     pub fn run<S: Site + Send + 'static>(
         self,
         site: S,
         stop: &AtomicBool,
-        look: impl FnMut(&mut S),
+        poll: impl FnMut(&mut S),
     ) -> Result<(), Error> {
         let failed = |source: io::Error| Error::Listen { port: self.port, source };
-        // One thread: there is one page, and its requests are short.
+        // One thread suffices: there is one page, and its requests are short.
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
-        let shared = Arc::new(Shared { gate: Gate::new(self.port), site: Mutex::new(site) });
-        let _inside = runtime.enter();
+        let shared = Arc::new(Shared { origin: OriginCheck::new(self.port), site: Mutex::new(site) });
+        let _guard = runtime.enter();
         let listener = tokio::net::TcpListener::from_std(self.listener).map_err(failed)?;
-        runtime.block_on(accept(&listener, &shared, stop, look));
+        runtime.block_on(accept(&listener, &shared, stop, poll));
         Ok(())
     }
 }
@@ -134,26 +137,30 @@ async fn accept<S: Site + Send + 'static>(
     listener: &tokio::net::TcpListener,
     shared: &Arc<Shared<S>>,
     stop: &AtomicBool,
-    mut look: impl FnMut(&mut S),
+    mut poll: impl FnMut(&mut S),
 ) {
-    let places = Arc::new(Semaphore::new(CONNECTIONS));
+    let slots = Arc::new(Semaphore::new(MAX_CONNECTIONS));
     loop {
-        let ends = stop.load(Ordering::SeqCst);
-        look(&mut shared.site());
-        if ends {
+        let stopping = stop.load(Ordering::SeqCst);
+        poll(&mut shared.site());
+        if stopping {
             return;
         }
-        let stream = match tokio::time::timeout(LOOK, listener.accept()).await {
+        let stream = match tokio::time::timeout(POLL, listener.accept()).await {
             Ok(Ok((stream, _))) => stream,
-            // Too many open files, or a connection that was gone at once: others may do better later.
+            // Too many open files, or an aborted connection: later ones may succeed.
             Ok(Err(_)) => {
-                tokio::time::sleep(LOOK).await;
+                tokio::time::sleep(POLL).await;
                 continue;
             }
             Err(_) => continue,
         };
-        // Who comes while all places are taken is sent away.
-        let Ok(place) = Arc::clone(&places).try_acquire_owned() else { continue };
+        // hyper panics on a date that HTTP cannot express.
+        if !is_http_date(now()) {
+            continue;
+        }
+        // Drops the connection if the limit is reached.
+        let Ok(slot) = Arc::clone(&slots).try_acquire_owned() else { continue };
         let shared = Arc::clone(shared);
         tokio::spawn(async move {
             let service = service_fn(move |request| {
@@ -161,34 +168,34 @@ async fn accept<S: Site + Send + 'static>(
                 async move { Ok::<_, Infallible>(response(answer(&shared, request).await)) }
             });
             let mut connection = http1::Builder::new();
-            connection.timer(TokioTimer::new()).header_read_timeout(PATIENCE).max_buf_size(LONGEST_HEAD);
-            // What goes wrong with a connection is over with it.
+            connection.timer(TokioTimer::new()).header_read_timeout(REQUEST_TIMEOUT).max_buf_size(MAX_HEAD);
+            // Errors of a connection end that connection only.
             let _ = connection.serve_connection(TokioIo::new(stream), service).await;
-            drop(place);
+            drop(slot);
         });
     }
 }
 
 async fn answer<S: Site>(shared: &Shared<S>, request: hyper::Request<Incoming>) -> Reply {
     let (head, body) = request.into_parts();
-    if body.size_hint().lower() > LONGEST_BODY as u64 {
-        return Reply::refusal(413, "that is too long");
+    if body.size_hint().lower() > MAX_BODY as u64 {
+        return Reply::error(413, "the request body is too long");
     }
-    // Of anything but a POST the body is not read; the connection ends if there is one.
+    // Only the body of a POST request is read.
     let body = match head.method {
-        Method::POST => match tokio::time::timeout(PATIENCE, Limited::new(body, LONGEST_BODY).collect()).await {
+        Method::POST => match tokio::time::timeout(REQUEST_TIMEOUT, Limited::new(body, MAX_BODY).collect()).await {
             Ok(Ok(body)) => body.to_bytes(),
-            Ok(Err(_)) => return Reply::refusal(413, "that is too long, or was cut off"),
-            Err(_) => return Reply::refusal(408, "that took too long"),
+            Ok(Err(_)) => return Reply::error(413, "the request body is too long or incomplete"),
+            Err(_) => return Reply::error(408, "the request took too long"),
         },
         _ => Bytes::new(),
     };
-    // A whole address would name a host besides the header.
+    // An absolute URI would name a second host.
     if head.uri.authority().is_some() {
-        return Reply::refusal(400, "a path alone is expected");
+        return Reply::error(400, "expected a path, not an absolute URI");
     }
-    if let Some(refusal) = shared.gate.refuses(&head.headers) {
-        return refusal;
+    if let Some(error) = shared.origin.rejects(&head.headers) {
+        return error;
     }
     let target = head.uri.path_and_query().map_or("", |target| target.as_str());
     let request = Request {
@@ -198,6 +205,17 @@ async fn answer<S: Site>(shared: &Shared<S>, request: hyper::Request<Incoming>) 
         body: &body,
     };
     shared.site().reply(&request)
+}
+
+#[expect(clippy::disallowed_methods, reason = "checks the clock that hyper reads; it reaches no image")]
+fn now() -> SystemTime {
+    SystemTime::now()
+}
+
+/// Whether a time is in the years 1970 to 9999, the range of dates in HTTP.
+fn is_http_date(time: SystemTime) -> bool {
+    const END_S: u64 = 253_402_300_800;
+    time.duration_since(UNIX_EPOCH).is_ok_and(|since| since.as_secs() < END_S)
 }
 
 fn response(reply: Reply) -> Response<Full<Bytes>> {
@@ -217,4 +235,16 @@ fn response(reply: Reply) -> Response<Full<Bytes>> {
         headers.insert(ALLOW, HeaderValue::from_static(allow));
     }
     response
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_outside_1970_to_9999_are_no_http_dates() {
+        let after = |seconds| UNIX_EPOCH + Duration::from_secs(seconds);
+        assert!(is_http_date(UNIX_EPOCH) && is_http_date(after(253_402_300_799)));
+        assert!(!is_http_date(UNIX_EPOCH - Duration::from_nanos(1)) && !is_http_date(after(253_402_300_800)));
+    }
 }

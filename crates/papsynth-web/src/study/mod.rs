@@ -1,9 +1,8 @@
-//! The visual study: what is answered to a request. No network and no files of the study's folders: everything that can be
-//! sent lies in memory.
+//! The page of the visual study. All patches are in memory; no request reads a file.
 
 use std::sync::atomic::AtomicBool;
 
-use papsynth_study::{Answer, Exposure, Refusal, Session};
+use papsynth_study::{Answer, Exposure, Session, SessionError};
 use serde::Deserialize;
 
 use crate::error::Error;
@@ -16,29 +15,28 @@ const PAGE: [File; 3] = [
     ("/study.js", JS, include_str!("page/study.js")),
 ];
 
-/// Where patches are asked for, before their name.
+/// Path of patches, before their name.
 const PATCH: &str = "/patch/";
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Shown {
+struct ShownRequest {
     patch: String,
     exposure: Exposure,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Said {
+struct AnswerRequest {
     patch: String,
     answer: Answer,
     response_ms: f64,
 }
 
-/// Serves a study until `stop` is set. `finished` is called once when everything has been answered, at once if it has been
-/// before.
+/// Serves a study until `stop` is set. Calls `finished` once, when every trial has an answer.
 ///
 /// # Errors
-/// If the system refuses what serving takes, or the port cannot be kept with the study.
+/// If the server fails, or the port cannot be saved with the study.
 pub fn serve_study(
     server: Server,
     mut session: Session,
@@ -46,10 +44,10 @@ pub fn serve_study(
     mut finished: impl FnMut(&Session),
 ) -> Result<(), Error> {
     session.set_port(server.port())?;
-    let mut told = false;
+    let mut reported = false;
     server.run(session, stop, |session| {
-        if !told && session.is_finished() {
-            told = true;
+        if !reported && session.is_finished() {
+            reported = true;
             finished(session);
         }
     })
@@ -57,7 +55,7 @@ pub fn serve_study(
 
 impl Site for Session {
     fn reply(&mut self, request: &Request) -> Reply {
-        page::file(&PAGE, request).unwrap_or_else(|| answer(self, request).unwrap_or_else(|refusal| refusal))
+        page::file(&PAGE, request).unwrap_or_else(|| answer(self, request).unwrap_or_else(|error| error))
     }
 }
 
@@ -65,31 +63,31 @@ fn answer(session: &mut Session, request: &Request) -> Result<Reply, Reply> {
     match (request.method, request.target) {
         ("GET", "/state") => Ok(Reply::json(&session.state())),
         ("GET", "/result") if session.is_finished() => Ok(Reply::json(&session.summary())),
-        ("GET", "/result") => Err(Reply::refusal(409, "there is no result before the last answer")),
+        ("GET", "/result") => Err(Reply::error(409, "the result is available after the last answer")),
         ("GET", target) if target.starts_with(PATCH) => Ok(Reply::png(session.patch(&target[PATCH.len()..])?.to_vec())),
         ("POST", "/shown") => {
-            let Shown { patch, exposure } = request.json()?;
+            let ShownRequest { patch, exposure } = request.json()?;
             session.shown(&patch, exposure)?;
             Ok(Reply::json(&session.state()))
         }
         ("POST", "/answer") => {
-            let Said { patch, answer, response_ms } = request.json()?;
+            let AnswerRequest { patch, answer, response_ms } = request.json()?;
             session.answer(&patch, answer, response_ms)?;
             Ok(Reply::json(&session.state()))
         }
-        (_, "/state" | "/result") => Err(Reply::method("GET")),
-        (_, "/shown" | "/answer") => Err(Reply::method("POST")),
-        (_, target) if target.starts_with(PATCH) => Err(Reply::method("GET")),
-        _ => Err(Reply::refusal(404, "there is nothing here")),
+        (_, "/state" | "/result") => Err(Reply::wrong_method("GET")),
+        (_, "/shown" | "/answer") => Err(Reply::wrong_method("POST")),
+        (_, target) if target.starts_with(PATCH) => Err(Reply::wrong_method("GET")),
+        _ => Err(Reply::error(404, "not found")),
     }
 }
 
-impl From<Refusal> for Reply {
-    fn from(refusal: Refusal) -> Self {
-        match refusal {
-            Refusal::Stale => Self::refusal(409, "this is not what is asked now"),
-            Refusal::Nonsense => Self::refusal(400, "this is nothing that the page sends"),
-            Refusal::NotWritten(error) => Self::refusal(500, &format!("it could not be kept: {error}")),
+impl From<SessionError> for Reply {
+    fn from(error: SessionError) -> Self {
+        match error {
+            SessionError::Stale => Self::error(409, "this trial is not the current one"),
+            SessionError::Invalid => Self::error(400, "invalid answer"),
+            SessionError::NotWritten(error) => Self::error(500, &format!("cannot save the study: {error}")),
         }
     }
 }

@@ -1,78 +1,78 @@
-//! A data set: its frames decoded, a few at a time.
+//! The source of a data set: decodes frames on demand and caches a few.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 use papsynth::truth::{Bounds, Group, Mask, ObjectTruth};
-use papsynth_dataset::{Dataset, FramePlace, FrameSummary};
+use papsynth_dataset::{Dataset, FrameLocation, FrameSummary};
 use serde_json::{Value, json};
 
 use super::grid::Grid;
 use super::labels::{Ids, colour_text};
 use super::levels::Levels;
-use super::source::{At, Picture, Source, check_pixel, check_plane, png};
+use super::source::{TileIndex, ImageInfo, Source, check_pixel, check_plane, png};
 use crate::server::Reply;
 
-/// Side of a tile, px.
+/// Size of a tile, px.
 const TILE: usize = 256;
 
-/// Frames that are kept decoded at most.
-const KEPT: usize = 3;
+/// Maximum number of cached frames.
+const CACHED_FRAMES: usize = 3;
 
-/// Bytes of decoded planes that are kept at most, but for one plane, however large it is.
-const MOST_BYTES: usize = 1 << 28;
+/// Maximum size of the cached planes, bytes; one plane is always cached.
+const MAX_CACHED_BYTES: usize = 1 << 28;
 
-pub(crate) struct Fields {
+pub(crate) struct DatasetSource {
     dataset: Dataset,
-    places: Vec<FramePlace>,
-    /// The frames that were asked for last, the last of all first.
-    kept: Vec<Frame>,
+    places: Vec<FrameLocation>,
+    /// The frames that were used last, the most recent first.
+    cached: Vec<Frame>,
 }
 
-/// A frame, as far as it was needed.
+/// A frame with the planes and objects that were requested.
 struct Frame {
-    place: FramePlace,
+    place: FrameLocation,
     summary: FrameSummary,
     grid: Grid,
     planes: BTreeMap<usize, Levels>,
-    objects: Option<Vec<Shown>>,
+    objects: Option<Vec<VisibleObject>>,
 }
 
-/// An object, and where its visible part lies.
-struct Shown {
+/// An object and the bounds of its visible mask.
+struct VisibleObject {
     truth: ObjectTruth,
-    front: Option<Bounds>,
+    bounds: Option<Bounds>,
 }
 
-impl Fields {
+impl DatasetSource {
     pub(crate) fn new(dataset: Dataset) -> Self {
-        Self { dataset, places: Vec::new(), kept: Vec::new() }
+        Self { dataset, places: Vec::new(), cached: Vec::new() }
     }
 
-    /// The frame, first among those kept.
-    fn frame(&mut self, picture: usize) -> Result<&mut Frame, Reply> {
+    /// Returns a frame and moves it to the front of the cache.
+    fn frame(&mut self, image: usize) -> Result<&mut Frame, Reply> {
         if self.places.is_empty() {
-            self.places = self.dataset.places()?;
+            self.places = self.dataset.frame_locations()?;
         }
-        let place = *self.places.get(picture).ok_or_else(|| {
-            Reply::refusal(404, &format!("there is no picture {picture}; there are {}", self.places.len()))
+        let place = *self.places.get(image).ok_or_else(|| {
+            Reply::error(404, &format!("no image {image}: expected 0 to {}", self.places.len().saturating_sub(1)))
         })?;
-        match self.kept.iter().position(|frame| frame.place == place) {
-            Some(at) => self.kept[..=at].rotate_right(1),
+        match self.cached.iter().position(|frame| frame.place == place) {
+            Some(at) => self.cached[..=at].rotate_right(1),
             None => {
                 let summary = self.dataset.summary(place)?;
                 let grid = Grid::new(summary.width, summary.height, TILE);
-                self.kept.insert(0, Frame { place, summary, grid, planes: BTreeMap::new(), objects: None });
-                self.kept.truncate(KEPT);
+                self.cached.insert(0, Frame { place, summary, grid, planes: BTreeMap::new(), objects: None });
+                self.cached.truncate(CACHED_FRAMES);
             }
         }
-        Ok(&mut self.kept[0])
+        Ok(&mut self.cached[0])
     }
 
-    /// The frame with a plane decoded. Planes lie in one file mostly, so that others are decoded with it, as many as may be kept.
-    fn with_plane(&mut self, picture: usize, plane: usize) -> Result<&Frame, Reply> {
+    /// Returns a frame with a plane decoded. Planes are mostly in one file, so as many as fit in the cache are decoded.
+    fn with_plane(&mut self, image: usize, plane: usize) -> Result<&Frame, Reply> {
         let has_planes = self.dataset.has_planes();
-        let frame = self.frame(picture)?;
+        let frame = self.frame(image)?;
         check_plane(plane, frame.planes_um(has_planes).len().max(1))?;
         if !frame.planes.contains_key(&plane) {
             let wanted = frame.neighbours(plane, frame.planes_um(has_planes).len().max(1));
@@ -83,18 +83,18 @@ impl Fields {
                     planes.insert(number, Levels::new(grid, summary.channels, &values, summary.white()));
                 }
             })?;
-            self.kept[0].planes = planes;
-            self.forget();
+            self.cached[0].planes = planes;
+            self.evict();
         }
-        Ok(&self.kept[0])
+        Ok(&self.cached[0])
     }
 
-    /// Lets planes of other frames go until what is left may be kept.
-    fn forget(&mut self) {
+    /// Removes planes of older frames until the rest fits in the cache.
+    fn evict(&mut self) {
         let mut bytes = 0;
-        for frame in &mut self.kept {
+        for frame in &mut self.cached {
             let own = frame.plane_bytes() * frame.planes.len();
-            if bytes > 0 && bytes + own > MOST_BYTES {
+            if bytes > 0 && bytes + own > MAX_CACHED_BYTES {
                 frame.planes.clear();
             } else {
                 bytes += own;
@@ -102,24 +102,24 @@ impl Fields {
         }
     }
 
-    fn with_truth(&mut self, picture: usize) -> Result<(&Frame, &[Shown]), Reply> {
-        let frame = self.frame(picture)?;
+    fn with_truth(&mut self, image: usize) -> Result<(&Frame, &[VisibleObject]), Reply> {
+        let frame = self.frame(image)?;
         if frame.objects.is_none() {
             let (place, size) = (frame.place, [frame.summary.width, frame.summary.height]);
             let truth = self.dataset.truth(place)?;
             if [truth.width, truth.height] != size {
-                return Err(Reply::refusal(
+                return Err(Reply::error(
                     500,
                     &format!(
-                        "frame {}: the truth is of {} x {} pixels, the record of {} x {}",
+                        "frame {}: the ground truth has {} x {} pixels, the record {} x {}",
                         place.index, truth.width, truth.height, size[0], size[1]
                     ),
                 ));
             }
-            let shown = |truth: ObjectTruth| Shown { front: truth.front.bounds(), truth };
-            self.kept[0].objects = Some(truth.objects.into_iter().map(shown).collect());
+            let shown = |truth: ObjectTruth| VisibleObject { bounds: truth.visible.bounds(), truth };
+            self.cached[0].objects = Some(truth.objects.into_iter().map(shown).collect());
         }
-        let frame = &self.kept[0];
+        let frame = &self.cached[0];
         Ok((frame, frame.objects.as_deref().unwrap_or_default()))
     }
 }
@@ -129,81 +129,81 @@ impl Frame {
         if has_planes || self.summary.planes_um.len() == 1 { &self.summary.planes_um } else { &[] }
     }
 
-    /// Bytes of a decoded plane with all its levels, not quite.
+    /// Approximate size of a decoded plane with all its levels, bytes.
     fn plane_bytes(&self) -> usize {
         self.summary.width * self.summary.height * self.summary.channels * 4 / 3
     }
 
-    /// As many planes about one as may be kept.
+    /// Returns the planes around one that fit in the cache.
     fn neighbours(&self, plane: usize, planes: usize) -> Range<usize> {
-        let room = (MOST_BYTES / self.plane_bytes().max(1)).clamp(1, planes);
+        let room = (MAX_CACHED_BYTES / self.plane_bytes().max(1)).clamp(1, planes);
         let first = plane.saturating_sub(room / 2).min(planes - room);
         first..first + room
     }
 }
 
-impl Source for Fields {
+impl Source for DatasetSource {
     fn count(&mut self) -> Result<usize, Reply> {
-        // It may be growing.
-        self.places = self.dataset.places()?;
+        // A run may still be writing frames.
+        self.places = self.dataset.frame_locations()?;
         Ok(self.places.len())
     }
 
-    fn picture(&mut self, picture: usize) -> Result<Picture, Reply> {
+    fn image(&mut self, image: usize) -> Result<ImageInfo, Reply> {
         let has_planes = self.dataset.has_planes();
-        let frame = self.frame(picture)?;
+        let frame = self.frame(image)?;
         let planes_um = frame.planes_um(has_planes).to_vec();
-        Ok(Picture::new(format!("frame {}", frame.place.index), &frame.grid, frame.summary.pixel_um, planes_um))
+        Ok(ImageInfo::new(format!("frame {}", frame.place.index), &frame.grid, frame.summary.pixel_um, planes_um))
     }
 
-    fn tile(&mut self, picture: usize, plane: usize, at: At) -> Result<Reply, Reply> {
-        let cut = self.frame(picture)?.grid.cut(at.level, at.row, at.column)?;
-        let frame = self.with_plane(picture, plane)?;
+    fn tile(&mut self, image: usize, plane: usize, at: TileIndex) -> Result<Reply, Reply> {
+        let region = self.frame(image)?.grid.region(at.level, at.row, at.column)?;
+        let frame = self.with_plane(image, plane)?;
         let levels =
-            frame.planes.get(&plane).ok_or_else(|| Reply::refusal(500, &format!("plane {plane} is missing")))?;
-        png(&levels.part(at.level, &cut), cut.width(), frame.summary.channels)
+            frame.planes.get(&plane).ok_or_else(|| Reply::error(500, &format!("plane {plane} is missing")))?;
+        png(&levels.part(at.level, &region), region.width(), frame.summary.channels)
     }
 
-    fn label(&mut self, picture: usize, group: Group, at: At) -> Result<Reply, Reply> {
-        let grid = self.frame(picture)?.grid;
-        let (cut, size) = (grid.cut(at.level, at.row, at.column)?, grid.size(at.level)?);
-        let (_, objects) = self.with_truth(picture)?;
-        let mut ids = Ids::empty(&cut, size);
+    fn label(&mut self, image: usize, group: Group, at: TileIndex) -> Result<Reply, Reply> {
+        let grid = self.frame(image)?.grid;
+        let (region, size) = (grid.region(at.level, at.row, at.column)?, grid.size(at.level)?);
+        let (_, objects) = self.with_truth(image)?;
+        let mut ids = Ids::empty(&region, size);
         let step = 1 << at.level;
-        // A pixel of a level shows the upper left of those below it, as labels of slides do.
+        // A pixel of a level shows the upper left pixel of the level below, like labels of slides.
         let level = |px: u32| (px as usize).div_ceil(step);
-        let wider = cut.wider(size);
-        for Shown { truth, front } in objects.iter().filter(|object| object.truth.group() == group) {
-            let Some(bounds) = front else { continue };
+        let wider = region.wider(size);
+        for VisibleObject { truth, bounds } in objects.iter().filter(|object| object.truth.group() == group) {
+            let Some(bounds) = bounds else { continue };
             let is_apart = |part: &Range<usize>, start: u32, length: u32| {
                 level(start + length) <= part.start || level(start) >= part.end
             };
             if is_apart(&wider.rows, bounds.y, bounds.height) || is_apart(&wider.columns, bounds.x, bounds.width) {
                 continue;
             }
-            for run in truth.front.runs().iter().filter(|run| (run.y as usize).is_multiple_of(step)) {
-                ids.paint(&cut, run.y as usize / step, level(run.x0)..level(run.x1), truth.id);
+            for run in truth.visible.runs().iter().filter(|run| (run.y as usize).is_multiple_of(step)) {
+                ids.paint(&region, run.y as usize / step, level(run.x0)..level(run.x1), truth.id);
             }
         }
-        png(&ids.rgba(), cut.width(), 4)
+        png(&ids.rgba(), region.width(), 4)
     }
 
-    fn under(&mut self, picture: usize, x: usize, y: usize) -> Result<Vec<Value>, Reply> {
-        let Grid { width, height, .. } = self.frame(picture)?.grid;
+    fn objects_at(&mut self, image: usize, x: usize, y: usize) -> Result<Vec<Value>, Reply> {
+        let Grid { width, height, .. } = self.frame(image)?.grid;
         check_pixel(x, y, width, height)?;
-        let (_, objects) = self.with_truth(picture)?;
+        let (_, objects) = self.with_truth(image)?;
         let holds = |mask: &Mask| {
             mask.runs().iter().any(|run| run.y as usize == y && (run.x0 as usize..run.x1 as usize).contains(&x))
         };
         let mut found: Vec<&ObjectTruth> =
             objects.iter().map(|shown| &shown.truth).filter(|truth| holds(&truth.amodal)).collect();
         found.sort_by(|a, b| b.depth_um.total_cmp(&a.depth_um).then(b.part.cmp(&a.part)));
-        Ok(found.into_iter().map(|truth| told(truth, holds(&truth.front))).collect())
+        Ok(found.into_iter().map(|truth| object_json(truth, holds(&truth.visible))).collect())
     }
 }
 
-/// What the page says of an object.
-fn told(truth: &ObjectTruth, is_front: bool) -> Value {
+/// Returns an object as JSON for the page.
+fn object_json(truth: &ObjectTruth, is_visible: bool) -> Value {
     json!({
         "id": truth.id,
         "colour": colour_text(truth.id),
@@ -214,11 +214,11 @@ fn told(truth: &ObjectTruth, is_front: bool) -> Value {
         "bethesda": truth.bethesda,
         "traits": truth.traits,
         "cluster": truth.cluster,
-        "front": is_front,
+        "visible": is_visible,
         "centre_um": truth.centre_um,
         "depth_um": truth.depth_um,
         "area_um2": truth.area_um2,
-        "stain": truth.stain,
+        "mean_absorbance": truth.mean_absorbance,
         "tint": truth.tint_name(),
         "rotation_deg": truth.rotation_deg,
         "truncated": truth.truncated,

@@ -1,51 +1,51 @@
-//! Labels as colours: each object filled thinly, its outline opaque.
+//! Label colours: transparent fill, opaque outline.
 
-use super::grid::Cut;
+use super::grid::Region;
 
-/// Opacity of what lies within an outline.
+/// Opacity of the fill.
 const FILL: u8 = 76;
 
-/// Colours that people with defective colour vision tell apart, too (Okabe and Ito), without black.
+/// The colour-blind-safe palette of Okabe and Ito, without black.
 const COLOURS: [[u8; 3]; 7] =
     [[230, 159, 0], [86, 180, 233], [0, 158, 115], [240, 228, 66], [0, 114, 178], [213, 94, 0], [204, 121, 167]];
 
-/// Ids of a part of a level of labels, with a pixel more on every side.
+/// Label ids of a region, with a margin of one pixel.
 #[derive(Debug)]
 pub(crate) struct Ids {
     width: usize,
     height: usize,
-    /// Rows of `width + 2`; nothing beyond the border of the picture, or where it is not known.
+    /// Rows of `width + 2` ids; `None` outside the image and where the id is unknown.
     ids: Vec<Option<u32>>,
 }
 
 impl Ids {
-    /// No object in a part of a level of so many columns and rows; beyond its borders nothing is.
-    pub(crate) fn empty(cut: &Cut, size: [usize; 2]) -> Self {
-        let known = vec![0; cut.wider(size).rows.len() * cut.wider(size).width()];
-        Self::new(cut, &cut.wider(size), &known)
+    /// Creates a region without objects in a level of the given size.
+    pub(crate) fn empty(region: &Region, size: [usize; 2]) -> Self {
+        let known = vec![0; region.wider(size).rows.len() * region.wider(size).width()];
+        Self::new(region, &region.wider(size), &known)
     }
 
-    /// `ids` are those of `known`, a part of the level that holds `cut` and may reach a pixel further on every side.
-    pub(crate) fn new(cut: &Cut, known: &Cut, ids: &[u32]) -> Self {
-        let (width, height) = (cut.width(), cut.rows.len());
+    /// Creates the ids of `region` from those of `known`, a region that contains it and may have the margin.
+    pub(crate) fn new(region: &Region, known: &Region, ids: &[u32]) -> Self {
+        let (width, height) = (region.width(), region.rows.len());
         let mut all = vec![None; (width + 2) * (height + 2)];
         for (y, row) in known.rows.clone().zip(ids.chunks_exact(known.width().max(1))) {
-            let start = (y + 1 - cut.rows.start) * (width + 2) + known.columns.start + 1 - cut.columns.start;
+            let start = (y + 1 - region.rows.start) * (width + 2) + known.columns.start + 1 - region.columns.start;
             all[start..start + row.len()].iter_mut().zip(row).for_each(|(to, id)| *to = Some(*id));
         }
         Self { width, height, ids: all }
     }
 
-    /// Sets pixels of a row of the level, as far as they are known here.
-    pub(crate) fn paint(&mut self, cut: &Cut, y: usize, columns: std::ops::Range<usize>, id: u32) {
-        let Some(row) = (y + 1).checked_sub(cut.rows.start).filter(|row| *row < self.height + 2) else { return };
-        let along = |x: usize| (x + 1).saturating_sub(cut.columns.start).min(self.width + 2);
+    /// Sets the pixels of a row of the level that are in this region.
+    pub(crate) fn paint(&mut self, region: &Region, y: usize, columns: std::ops::Range<usize>, id: u32) {
+        let Some(row) = (y + 1).checked_sub(region.rows.start).filter(|row| *row < self.height + 2) else { return };
+        let along = |x: usize| (x + 1).saturating_sub(region.columns.start).min(self.width + 2);
         let row = row * (self.width + 2);
         let pixels = &mut self.ids[row + along(columns.start)..row + along(columns.end)];
         pixels.iter_mut().flatten().for_each(|pixel| *pixel = id);
     }
 
-    /// Red, green, blue and opacity of every pixel.
+    /// Returns red, green, blue and opacity of every pixel.
     pub(crate) fn rgba(&self) -> Vec<u8> {
         let row = self.width + 2;
         let mut bytes = Vec::with_capacity(4 * self.width * self.height);
@@ -65,9 +65,9 @@ impl Ids {
     }
 }
 
-/// The colour of an object: the same wherever and whenever it is shown.
+/// Returns the colour of an object, which depends on its id only.
 fn colour(id: u32) -> [u8; 3] {
-    // Fibonacci hashing: ids that follow each other are as far apart as they can be.
+    // Fibonacci hashing: consecutive ids get colours that are far apart.
     let hash = u64::from(id.wrapping_mul(0x9E37_79B9));
     let number = usize::try_from((hash * 3 * COLOURS.len() as u64) >> u32::BITS).unwrap_or_default();
     let [colour, shade] = [number % COLOURS.len(), number / COLOURS.len()];
@@ -79,7 +79,7 @@ fn colour(id: u32) -> [u8; 3] {
     COLOURS[colour].map(shaded)
 }
 
-/// The same as a style sheet writes it.
+/// Returns the colour of an object in CSS notation.
 pub(crate) fn colour_text(id: u32) -> String {
     let [red, green, blue] = colour(id);
     format!("#{red:02x}{green:02x}{blue:02x}")
@@ -92,7 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ids_that_follow_each_other_have_colours_of_their_own() {
+    fn consecutive_ids_have_different_colours() {
         let colours: Vec<_> = (1..2000).map(colour).collect();
         assert_eq!(colours.iter().collect::<BTreeSet<_>>().len(), 21);
         assert!(colours.windows(3).all(|three| three[0] != three[1] && three[0] != three[2]));
@@ -102,10 +102,10 @@ mod tests {
     fn outlines_do_not_depend_on_where_tiles_are_cut() {
         let (width, height) = (23, 17);
         let id = |x: usize, y: usize| u32::try_from((x / 5 + 3 * (y / 4)) % 4).unwrap();
-        let ids = |cut: &Cut| -> Vec<u32> {
-            cut.rows.clone().flat_map(|y| cut.columns.clone().map(move |x| id(x, y))).collect()
+        let ids = |region: &Region| -> Vec<u32> {
+            region.rows.clone().flat_map(|y| region.columns.clone().map(move |x| id(x, y))).collect()
         };
-        let all = Cut { rows: 0..height, columns: 0..width };
+        let all = Region { rows: 0..height, columns: 0..width };
         let whole = Ids::new(&all, &all, &ids(&all)).rgba();
         let mut edges = 0;
         for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
@@ -123,22 +123,22 @@ mod tests {
         }
         assert!(edges > 20);
         for (top, left) in (0..height).step_by(6).flat_map(|top| (0..width).step_by(6).map(move |left| (top, left))) {
-            let cut = Cut { rows: top..(top + 6).min(height), columns: left..(left + 6).min(width) };
-            let wider = cut.wider([width, height]);
-            let part = Ids::new(&cut, &wider, &ids(&wider)).rgba();
-            let expected: Vec<u8> = cut
+            let region = Region { rows: top..(top + 6).min(height), columns: left..(left + 6).min(width) };
+            let wider = region.wider([width, height]);
+            let part = Ids::new(&region, &wider, &ids(&wider)).rgba();
+            let expected: Vec<u8> = region
                 .rows
                 .clone()
-                .flat_map(|y| &whole[4 * (y * width + cut.columns.start)..4 * (y * width + cut.columns.end)])
+                .flat_map(|y| &whole[4 * (y * width + region.columns.start)..4 * (y * width + region.columns.end)])
                 .copied()
                 .collect();
-            assert_eq!(part, expected, "{cut:?}");
+            assert_eq!(part, expected, "{region:?}");
             // Painted run by run it is the same.
-            let mut painted = Ids::empty(&cut, [width, height]);
+            let mut painted = Ids::empty(&region, [width, height]);
             for y in 0..height {
-                (0..width).for_each(|x| painted.paint(&cut, y, x..x + 1, id(x, y)));
+                (0..width).for_each(|x| painted.paint(&region, y, x..x + 1, id(x, y)));
             }
-            assert_eq!(painted.rgba(), expected, "{cut:?}");
+            assert_eq!(painted.rgba(), expected, "{region:?}");
         }
     }
 }

@@ -1,13 +1,13 @@
-//! Pictures in 8 bits, at every size.
+//! Pyramids of 8-bit images.
 
-use super::grid::{Cut, Grid};
+use super::grid::{Region, Grid};
 
-/// A picture in 8 bits and all its halves.
+/// An 8-bit image at all levels.
 #[derive(Debug)]
 pub(crate) struct Levels {
     grid: Grid,
     channels: usize,
-    /// The bytes of each level, row by row, the channels of a pixel side by side.
+    /// The bytes of each level, row-major, channels interleaved.
     levels: Vec<Vec<u8>>,
 }
 
@@ -23,23 +23,23 @@ impl Levels {
         Self { grid, channels, levels }
     }
 
-    /// Bytes of a part of a level that is there.
-    pub(crate) fn part(&self, level: usize, cut: &Cut) -> Vec<u8> {
+    /// Returns the bytes of a region of a level.
+    pub(crate) fn part(&self, level: usize, region: &Region) -> Vec<u8> {
         let row = self.grid.width.div_ceil(1 << level) * self.channels;
-        let columns = cut.columns.start * self.channels..cut.columns.end * self.channels;
-        let rows = self.levels[level].chunks_exact(row).skip(cut.rows.start).take(cut.rows.len());
+        let columns = region.columns.start * self.channels..region.columns.end * self.channels;
+        let rows = self.levels[level].chunks_exact(row).skip(region.rows.start).take(region.rows.len());
         rows.flat_map(|row| &row[columns.clone()]).copied().collect()
     }
 }
 
-/// Levels of 0 to `white` as 0 to 255, halves upwards.
+/// Scales grey levels from 0 to `white` to 0 to 255, rounding half up.
 pub(crate) fn eight_bits(values: &[u16], white: u16) -> Vec<u8> {
     let white = u32::from(white.max(1));
     let scaled = |value: &u16| u8::try_from((u32::from(*value) * 255 + white / 2) / white).unwrap_or(u8::MAX);
     values.iter().map(scaled).collect()
 }
 
-/// Each pixel the mean of two by two, halves upwards; an odd last row or column counts twice.
+/// Returns the means of 2 × 2 pixels, rounded half up; an odd last row or column counts twice.
 fn halved(bytes: &[u8], width: usize, channels: usize) -> Vec<u8> {
     let rows: Vec<&[u8]> = bytes.chunks_exact(width * channels).collect();
     let mut half = Vec::with_capacity(width.div_ceil(2) * channels * rows.len().div_ceil(2));
@@ -70,12 +70,12 @@ mod tests {
             assert_eq!(eight_bits(&[0, white, white / 2], white)[..2], [0, 255], "{bits}");
         }
         assert_eq!(eight_bits(&[0, 1, 128, 255], 255), [0, 1, 128, 255]);
-        // Levels above white, which only a damaged file has.
+        // Grey levels above white occur in damaged files only.
         assert_eq!(eight_bits(&[u16::MAX], 4095), [255]);
     }
 
     proptest! {
-        /// Against the mean of those of the four pixels that there are.
+        /// Compares with the mean of the existing pixels of each 2 × 2 block.
         #[test]
         fn every_level_is_half_of_the_one_below(width in 1_usize..40, height in 1_usize..40, colour: bool, seed in 0_usize..999) {
             let channels = if colour { 3 } else { 1 };
@@ -84,7 +84,7 @@ mod tests {
             let levels = Levels::new(grid, channels, &values, 255);
             let whole = |level: usize| {
                 let [columns, rows] = grid.size(level).unwrap();
-                levels.part(level, &Cut { rows: 0..rows, columns: 0..columns })
+                levels.part(level, &Region { rows: 0..rows, columns: 0..columns })
             };
             prop_assert!(whole(0).iter().map(|&byte| u16::from(byte)).eq(values));
             for level in 1..grid.levels {

@@ -1,4 +1,4 @@
-//! Data sets and slides, with their truth over them: what is answered to the page.
+//! The viewer of data sets and slides: replies to the requests of the page.
 
 mod fields;
 mod grid;
@@ -17,8 +17,8 @@ use serde_json::json;
 use crate::error::Error;
 use crate::page::{self, CSS, File, HTML, JS};
 use crate::server::{Reply, Request, Site};
-use fields::Fields;
-use source::{At, Source};
+use fields::DatasetSource;
+use source::{TileIndex, Source};
 
 const PAGE: [File; 4] = [
     ("/", HTML, include_str!("page/index.html")),
@@ -27,24 +27,24 @@ const PAGE: [File; 4] = [
     ("/view.js", JS, include_str!("page/view.js")),
 ];
 
-/// A data set or a slide, as a page shows it. Nothing is written, and of what is read a few frames are kept.
-pub struct View {
+/// The viewer of a data set or a slide. It writes nothing.
+pub struct Viewer {
     title: String,
     kind: &'static str,
     source: Box<dyn Source>,
 }
 
-impl View {
+impl Viewer {
     /// Opens the folder of a data set or, with the feature `zarr`, of a slide.
     ///
     /// # Errors
-    /// If it holds neither, or what a build without that feature cannot show, or cannot be read.
+    /// If the folder contains neither, cannot be read, or needs a feature that this build lacks.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let (kind, source) = source(path)?;
         Ok(Self { title: title(path), kind, source })
     }
 
-    /// What is shown: "data set" or "slide".
+    /// Returns "data set" or "slide".
     #[must_use]
     pub fn kind(&self) -> &'static str {
         self.kind
@@ -54,34 +54,34 @@ impl View {
         let words: Vec<&str> = target.split('/').skip(1).take(7).collect();
         match words[..] {
             ["info"] => {
-                let (kind, pictures) = (self.kind, self.source.count()?);
+                let (kind, images) = (self.kind, self.source.count()?);
                 let groups = Group::ALL.map(Group::name);
-                Ok(Reply::json(&json!({ "title": self.title, "kind": kind, "pictures": pictures, "groups": groups })))
+                Ok(Reply::json(&json!({ "title": self.title, "kind": kind, "images": images, "groups": groups })))
             }
-            ["picture", picture] => Ok(Reply::json(&self.source.picture(number(picture)?)?)),
-            ["tile", picture, plane, level, name] => {
-                self.source.tile(number(picture)?, number(plane)?, place(level, name)?)
+            ["image", image] => Ok(Reply::json(&self.source.image(number(image)?)?)),
+            ["tile", image, plane, level, name] => {
+                self.source.tile(number(image)?, number(plane)?, place(level, name)?)
             }
-            ["label", picture, group, level, name] => {
+            ["label", image, group, level, name] => {
                 let group = Group::ALL.into_iter().find(|known| known.name() == group);
-                let group = group.ok_or_else(|| Reply::refusal(404, "there are no such labels"))?;
-                self.source.label(number(picture)?, group, place(level, name)?)
+                let group = group.ok_or_else(|| Reply::error(404, "unknown label group: expected cytoplasm, nucleus or debris"))?;
+                self.source.label(number(image)?, group, place(level, name)?)
             }
-            ["at", picture, x, y] => {
-                let (picture, x, y) = (number(picture)?, number(x)?, number(y)?);
-                Ok(Reply::json(&json!({ "x": x, "y": y, "objects": self.source.under(picture, x, y)? })))
+            ["at", image, x, y] => {
+                let (image, x, y) = (number(image)?, number(x)?, number(y)?);
+                Ok(Reply::json(&json!({ "x": x, "y": y, "objects": self.source.objects_at(image, x, y)? })))
             }
-            _ => Err(Reply::refusal(404, "there is nothing here")),
+            _ => Err(Reply::error(404, "not found")),
         }
     }
 }
 
-impl Site for View {
+impl Site for Viewer {
     fn reply(&mut self, request: &Request) -> Reply {
         if request.method != "GET" {
-            return Reply::method("GET");
+            return Reply::wrong_method("GET");
         }
-        let answer = || self.answer(request.target).unwrap_or_else(|refusal| refusal);
+        let answer = || self.answer(request.target).unwrap_or_else(|error| error);
         page::file(&PAGE, request).unwrap_or_else(answer)
     }
 }
@@ -91,21 +91,21 @@ fn title(path: &Path) -> String {
     whole.file_name().unwrap_or(whole.as_os_str()).to_string_lossy().into_owned()
 }
 
-/// What lies in a folder: "data set" or "slide".
+/// Opens a folder as a data set or a slide.
 fn source(path: &Path) -> Result<(&'static str, Box<dyn Source>), Error> {
     if path.join("slide.json").is_file() {
         return slide(path);
     }
     if !path.join("manifest.json").is_file() {
-        let what = if path.is_dir() { "holds neither a data set nor a slide" } else { "there is no such folder" };
-        return Err(folder(path, format!("{what}; expected a folder of `papsynth generate` or `slide make`")));
+        let what = if path.is_dir() { "contains neither a data set nor a slide" } else { "no such folder" };
+        return Err(folder(path, format!("{what}; expected a folder that `papsynth generate` or `papsynth slide make` wrote")));
     }
     let dataset = Dataset::open(path)?;
     let formats = &dataset.layout().formats;
     let needs: Option<Vec<&str>> = formats.iter().map(|format| format.needs()).collect();
     match needs.as_deref() {
-        Some([feature, ..]) => Err(folder(path, format!("{} needs {}", formats[0].name(), built_with(feature)))),
-        _ => Ok(("data set", Box::new(Fields::new(dataset)))),
+        Some([feature, ..]) => Err(folder(path, format!("the format {} needs {}", formats[0].name(), built_with(feature)))),
+        _ => Ok(("data set", Box::new(DatasetSource::new(dataset)))),
     }
 }
 
@@ -119,7 +119,7 @@ fn built_with(feature: &str) -> String {
 
 #[cfg(feature = "zarr")]
 fn slide(path: &Path) -> Result<(&'static str, Box<dyn Source>), Error> {
-    Ok(("slide", Box::new(slide::Slide::new(papsynth_dataset::slide::SlideSet::open(path)?))))
+    Ok(("slide", Box::new(slide::SlideSource::new(papsynth_dataset::slide::SlideSet::open(path)?))))
 }
 
 #[cfg(not(feature = "zarr"))]
@@ -127,16 +127,16 @@ fn slide(path: &Path) -> Result<(&'static str, Box<dyn Source>), Error> {
     Err(folder(path, format!("a slide needs {}", built_with("zarr"))))
 }
 
-/// A number as the page writes it: digits alone, and not too many.
+/// Parses a number of 1 to 9 digits.
 fn number(word: &str) -> Result<usize, Reply> {
     let is_number = (1..=9).contains(&word.len()) && word.bytes().all(|byte| byte.is_ascii_digit());
     let number = if is_number { word.parse().ok() } else { None };
-    number.ok_or_else(|| Reply::refusal(400, "a number of 1 to 9 digits is expected"))
+    number.ok_or_else(|| Reply::error(400, "expected a number of 1 to 9 digits"))
 }
 
-/// A level, and ROW-COLUMN.png.
-fn place(level: &str, name: &str) -> Result<At, Reply> {
+/// Parses a level and `ROW-COLUMN.png`.
+fn place(level: &str, name: &str) -> Result<TileIndex, Reply> {
     let name = name.strip_suffix(".png").and_then(|name| name.split_once('-'));
-    let (row, column) = name.ok_or_else(|| Reply::refusal(400, "ROW-COLUMN.png is expected"))?;
-    Ok(At { level: number(level)?, row: number(row)?, column: number(column)? })
+    let (row, column) = name.ok_or_else(|| Reply::error(400, "expected ROW-COLUMN.png"))?;
+    Ok(TileIndex { level: number(level)?, row: number(row)?, column: number(column)? })
 }

@@ -1,4 +1,4 @@
-//! A whole slide, read where it is looked at.
+//! The source of a whole slide: reads tiles on demand.
 
 use std::io::ErrorKind;
 
@@ -7,88 +7,88 @@ use papsynth_dataset::Error;
 use papsynth_dataset::slide::SlideSet;
 use serde_json::{Value, json};
 
-use super::grid::{Cut, Grid};
+use super::grid::{Region, Grid};
 use super::labels::{Ids, colour_text};
 use super::levels::eight_bits;
-use super::source::{At, Picture, Source, check_pixel, check_plane, png};
+use super::source::{TileIndex, ImageInfo, Source, check_pixel, check_plane, png};
 use crate::server::Reply;
 
-/// Side of a tile, px: that of a chunk, which is decoded whole.
+/// Size of a tile, px: that of a chunk, which can only be decoded as a whole.
 const TILE: usize = 512;
 
-pub(crate) struct Slide {
+pub(crate) struct SlideSource {
     set: SlideSet,
 }
 
-impl Slide {
+impl SlideSource {
     pub(crate) fn new(set: SlideSet) -> Self {
         Self { set }
     }
 
-    /// How it is cut now: more levels are there once it is closed.
-    fn grid(&self, picture: usize) -> Result<Grid, Reply> {
-        if picture > 0 {
-            return Err(Reply::refusal(404, &format!("there is no picture {picture}; a slide is one")));
+    /// Returns the current grid: completed slides have more levels.
+    fn grid(&self, image: usize) -> Result<Grid, Reply> {
+        if image > 0 {
+            return Err(Reply::error(404, &format!("no image {image}: a slide is one image")));
         }
         let head = self.set.head();
         let whole = Grid::new(head.width_px as usize, head.height_px as usize, TILE);
-        Ok(Grid { levels: self.set.levels_there(), ..whole })
+        Ok(Grid { levels: self.set.written_levels(), ..whole })
     }
 }
 
-impl Source for Slide {
+impl Source for SlideSource {
     fn count(&mut self) -> Result<usize, Reply> {
         Ok(1)
     }
 
-    fn picture(&mut self, picture: usize) -> Result<Picture, Reply> {
-        let (grid, head) = (self.grid(picture)?, self.set.head());
-        Ok(Picture::new(format!("slide {}", head.slide), &grid, head.pixel_um, head.planes_um.clone()))
+    fn image(&mut self, image: usize) -> Result<ImageInfo, Reply> {
+        let (grid, head) = (self.grid(image)?, self.set.head());
+        Ok(ImageInfo::new(format!("slide {}", head.slide), &grid, head.pixel_um, head.planes_um.clone()))
     }
 
-    fn tile(&mut self, picture: usize, plane: usize, at: At) -> Result<Reply, Reply> {
-        let (grid, head) = (self.grid(picture)?, self.set.head());
+    fn tile(&mut self, image: usize, plane: usize, at: TileIndex) -> Result<Reply, Reply> {
+        let (grid, head) = (self.grid(image)?, self.set.head());
         check_plane(plane, head.planes_um.len())?;
-        let cut = grid.cut(at.level, at.row, at.column)?;
-        let values = self.set.picture(at.level, plane, cut.rows.clone(), cut.columns.clone()).map_err(refused)?;
+        let region = grid.region(at.level, at.row, at.column)?;
+        let values = self.set.image(at.level, plane, region.rows.clone(), region.columns.clone()).map_err(reply_to)?;
         let white = u16::MAX >> 16_u32.saturating_sub(head.bits).min(15);
-        png(&eight_bits(&values, white), cut.width(), head.channels)
+        png(&eight_bits(&values, white), region.width(), head.channels)
     }
 
-    fn label(&mut self, picture: usize, group: Group, at: At) -> Result<Reply, Reply> {
-        let grid = self.grid(picture)?;
-        let (cut, size) = (grid.cut(at.level, at.row, at.column)?, grid.size(at.level)?);
-        let read = |part: &Cut| {
+    fn label(&mut self, image: usize, group: Group, at: TileIndex) -> Result<Reply, Reply> {
+        let grid = self.grid(image)?;
+        let (region, size) = (grid.region(at.level, at.row, at.column)?, grid.size(at.level)?);
+        let read = |part: &Region| {
             let ids = self.set.labels(group, at.level, part.rows.clone(), part.columns.clone());
-            ids.map(|ids| Ids::new(&cut, part, &ids)).map_err(refused)
+            ids.map(|ids| Ids::new(&region, part, &ids)).map_err(reply_to)
         };
-        // The margin may lie in a shard that is not written yet.
-        let ids = match read(&cut.wider(size)) {
-            Err(Reply { status: 404, .. }) => read(&cut)?,
+        // The margin may be in a shard that is not written yet.
+        let ids = match read(&region.wider(size)) {
+            Err(Reply { status: 404, .. }) => read(&region)?,
             read => read?,
         };
-        png(&ids.rgba(), cut.width(), 4)
+        png(&ids.rgba(), region.width(), 4)
     }
 
-    fn under(&mut self, picture: usize, x: usize, y: usize) -> Result<Vec<Value>, Reply> {
-        let grid = self.grid(picture)?;
+    fn objects_at(&mut self, image: usize, x: usize, y: usize) -> Result<Vec<Value>, Reply> {
+        let grid = self.grid(image)?;
         check_pixel(x, y, grid.width, grid.height)?;
         let mut found = Vec::new();
         for group in [Group::Debris, Group::Nucleus, Group::Cytoplasm] {
-            let ids = self.set.labels(group, 0, y..y + 1, x..x + 1).map_err(refused)?;
+            let ids = self.set.labels(group, 0, y..y + 1, x..x + 1).map_err(reply_to)?;
             let there = ids.into_iter().filter(|id| *id != 0);
             found.extend(
-                there.map(|id| json!({ "id": id, "colour": colour_text(id), "group": group.name(), "front": true })),
+                there.map(|id| json!({ "id": id, "colour": colour_text(id), "group": group.name(), "visible": true })),
             );
         }
         Ok(found)
     }
 }
 
-/// What is not written yet is no damage.
-fn refused(error: Error) -> Reply {
+/// Missing shards are not errors: they may not be written yet.
+fn reply_to(error: Error) -> Reply {
     match &error {
-        Error::Io { source, .. } if source.kind() == ErrorKind::NotFound => Reply::refusal(404, "not made yet"),
+        Error::Io { source, .. } if source.kind() == ErrorKind::NotFound => Reply::error(404, "not written yet"),
         _ => error.into(),
     }
 }

@@ -1,4 +1,4 @@
-//! What can be shown: a data set or a slide, asked the same things.
+//! The interface of data sets and slides to the viewer.
 
 use papsynth::truth::Group;
 use png::{BitDepth, ColorType, Compression, Encoder, Filter};
@@ -9,45 +9,45 @@ use super::grid::Grid;
 use crate::server::Reply;
 
 pub(crate) trait Source: Send {
-    /// How many pictures there are now.
+    /// Returns the current number of images.
     fn count(&mut self) -> Result<usize, Reply>;
 
-    /// What a picture is like.
-    fn picture(&mut self, picture: usize) -> Result<Picture, Reply>;
+    /// Returns size, planes and tiles of an image.
+    fn image(&mut self, image: usize) -> Result<ImageInfo, Reply>;
 
-    /// A tile of a plane.
-    fn tile(&mut self, picture: usize, plane: usize, at: At) -> Result<Reply, Reply>;
+    /// Returns a tile of a plane as PNG.
+    fn tile(&mut self, image: usize, plane: usize, at: TileIndex) -> Result<Reply, Reply>;
 
-    /// A tile of the labels of a group.
-    fn label(&mut self, picture: usize, group: Group, at: At) -> Result<Reply, Reply>;
+    /// Returns a tile of the labels of a group as PNG.
+    fn label(&mut self, image: usize, group: Group, at: TileIndex) -> Result<Reply, Reply>;
 
-    /// What lies under a pixel, nearest first.
-    fn under(&mut self, picture: usize, x: usize, y: usize) -> Result<Vec<Value>, Reply>;
+    /// Returns the objects at a pixel, the nearest to the objective first.
+    fn objects_at(&mut self, image: usize, x: usize, y: usize) -> Result<Vec<Value>, Reply>;
 }
 
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct At {
+pub(crate) struct TileIndex {
     pub(crate) level: usize,
     pub(crate) row: usize,
     pub(crate) column: usize,
 }
 
-/// What the page must know of a picture before it asks for tiles.
+/// Properties of an image that the page needs before it requests tiles.
 #[derive(Debug, Serialize)]
-pub(crate) struct Picture {
+pub(crate) struct ImageInfo {
     pub(crate) name: String,
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// Side of a pixel, µm.
+    /// Pixel size, µm.
     pub(crate) pixel_um: f64,
-    /// Travel of the stage to each plane, µm; nothing if the picture has everything in focus.
+    /// Stage position of each plane, µm; empty for images of extended depth of field.
     pub(crate) planes_um: Vec<f64>,
     pub(crate) levels: usize,
-    /// Side of a tile, px.
+    /// Size of a tile, px.
     pub(crate) tile: usize,
 }
 
-impl Picture {
+impl ImageInfo {
     pub(crate) fn new(name: String, grid: &Grid, pixel_um: f64, planes_um: Vec<f64>) -> Self {
         let Grid { width, height, tile, levels } = *grid;
         Self { name, width, height, pixel_um, planes_um, levels, tile }
@@ -58,17 +58,17 @@ pub(crate) fn check_plane(plane: usize, planes: usize) -> Result<(), Reply> {
     if plane < planes {
         return Ok(());
     }
-    Err(Reply::refusal(404, &format!("there is no plane {plane}; the last is {}", planes.saturating_sub(1))))
+    Err(Reply::error(404, &format!("no plane {plane}: expected 0 to {}", planes.saturating_sub(1))))
 }
 
 pub(crate) fn check_pixel(x: usize, y: usize, width: usize, height: usize) -> Result<(), Reply> {
     if x < width && y < height {
         return Ok(());
     }
-    Err(Reply::refusal(404, &format!("there is no pixel {x}, {y} in {width} x {height}")))
+    Err(Reply::error(404, &format!("no pixel {x}, {y} in an image of {width} x {height} pixels")))
 }
 
-/// Bytes of 1, 3 or 4 channels a pixel as a PNG file.
+/// Encodes bytes of 1, 3 or 4 channels per pixel as PNG.
 pub(crate) fn png(bytes: &[u8], width: usize, channels: usize) -> Result<Reply, Reply> {
     let color = match channels {
         1 => ColorType::Grayscale,
@@ -88,5 +88,5 @@ pub(crate) fn png(bytes: &[u8], width: usize, channels: usize) -> Result<Reply, 
         writer.finish()?;
         Ok::<_, png::EncodingError>(out)
     };
-    encode().map(Reply::png).map_err(|error| Reply::refusal(500, &error.to_string()))
+    encode().map(Reply::png).map_err(|error| Reply::error(500, &error.to_string()))
 }

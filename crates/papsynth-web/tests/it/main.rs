@@ -1,4 +1,4 @@
-//! Integration tests, linked as one program.
+//! Integration tests, linked as one binary.
 
 mod server;
 mod study;

@@ -1,4 +1,4 @@
-//! The server, spoken to byte by byte.
+//! Tests of the server with raw HTTP requests.
 
 use std::net::TcpStream;
 use std::sync::Arc;
@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 
 use crate::support::{Answer, send};
-use papsynth_web::{Error, LONGEST_BODY, Reply, Request, Server, Site};
+use papsynth_web::{Error, MAX_BODY, Reply, Request, Server, Site};
 
-/// Says what it was sent, and counts.
+/// Echoes request bodies and counts requests.
 struct Echo(usize);
 
 impl Site for Echo {
@@ -18,11 +18,11 @@ impl Site for Echo {
             ("GET", "/count") => Reply::json(&self.0),
             ("POST", "/echo") => match request.json::<Vec<u32>>() {
                 Ok(numbers) => Reply::json(&numbers),
-                Err(refusal) => refusal,
+                Err(error) => error,
             },
-            (_, "/echo") => Reply::method("POST"),
+            (_, "/echo") => Reply::wrong_method("POST"),
             ("GET", "/panic") => panic!("a site may fail"),
-            _ => Reply::refusal(404, "nothing"),
+            _ => Reply::error(404, "nothing"),
         }
     }
 }
@@ -46,7 +46,7 @@ impl Running {
         Self { port, stop, seen, thread }
     }
 
-    /// Sends bytes as they are; the status and all that came back.
+    /// Sends raw bytes and returns the status and the whole reply.
     fn send(&self, bytes: &[u8]) -> (u16, String) {
         let Answer { status, head, body } = send(self.port, bytes);
         (status, head + &String::from_utf8_lossy(&body))
@@ -61,7 +61,7 @@ impl Running {
 }
 
 #[test]
-fn a_site_is_asked_until_it_is_stopped_whatever_it_does() {
+fn the_server_runs_until_stopped_even_after_a_panic() {
     let running = Running::start();
     assert!(running.ask("GET /count", "", "").1.ends_with("\r\n\r\n1"));
     assert_eq!(running.ask("GET /panic", "", "").0, 0);
@@ -74,7 +74,7 @@ fn a_site_is_asked_until_it_is_stopped_whatever_it_does() {
         ("Content-Type: text/plain\r\n", "[1]", 415),
         (json, "[1", 400),
         (json, "{}", 400),
-        (json, &" ".repeat(LONGEST_BODY + 1) as &str, 413),
+        (json, &" ".repeat(MAX_BODY + 1) as &str, 413),
     ] {
         assert_eq!(running.ask("POST /echo", headers, body).0, expected, "{headers}{body:.9}");
     }
@@ -92,12 +92,12 @@ fn a_site_is_asked_until_it_is_stopped_whatever_it_does() {
     running.stop.store(true, Ordering::SeqCst);
     let seen = Arc::clone(&running.seen);
     running.thread.join().unwrap().unwrap();
-    // Requests that were refused before never reached the site; its last state was seen.
+    // Rejected requests do not reach the site; `poll` sees its last state.
     assert_eq!(seen.load(Ordering::SeqCst), 3 + 5 + 1 + 1);
 }
 
 #[test]
-fn replies_are_not_kept_and_lead_nowhere() {
+fn replies_have_the_security_headers() {
     let running = Running::start();
     let head = running.ask("GET /count", "", "").1.to_lowercase();
     for header in [
@@ -115,12 +115,12 @@ fn replies_are_not_kept_and_lead_nowhere() {
 }
 
 #[test]
-fn it_listens_at_loopback_alone_and_a_port_that_is_taken_is_told_of() {
+fn it_listens_on_loopback_only_and_reports_a_port_in_use() {
     let server = Server::bind(0).unwrap();
     let error = Server::bind(server.port()).unwrap_err();
     assert!(error.to_string().contains(&format!("127.0.0.1, port {}", server.port())), "{error}");
-    // Somebody else's port of last time is no reason to end.
+    // A previous port that is in use is not an error.
     assert_ne!(Server::bind_near(server.port()).unwrap().port(), server.port());
-    // Other addresses of this machine, 127.0.0.2 among them, reach nobody.
+    // The server does not listen on other addresses such as 127.0.0.2.
     assert!(TcpStream::connect(("127.0.0.2", server.port())).is_err());
 }

@@ -1,11 +1,11 @@
-//! What is answered about a study, and what that tells.
+//! Tests of the replies of a study.
 
-use papsynth_study::{Session, StudyParams, Task};
-use papsynth_web::{JSON, LONGEST_BODY, Reply, Request, Site};
+use papsynth_study::{Session, StudyParams, TrialDesign};
+use papsynth_web::{JSON, MAX_BODY, Reply, Request, Site};
 
 use crate::support::Scratch;
 
-fn open(scratch: &Scratch, task: Task) -> Session {
+fn open(scratch: &Scratch, task: TrialDesign) -> Session {
     let params = StudyParams { trials: 4, training: 2, patch_px: 48, task, ..StudyParams::default() };
     let [real, synthetic, out] = ["real", "synthetic", "out"].map(|name| scratch.join(name));
     Session::open(&params, &real, &synthetic, &out).unwrap()
@@ -34,7 +34,7 @@ fn said(patch: &str, answer: &str) -> String {
     format!(r#"{{"patch":"{patch}","answer":"{answer}","response_ms":400.5}}"#)
 }
 
-/// Goes through a whole study and keeps every reply.
+/// Runs a whole study and returns every reply.
 fn transcript(study: &mut Session, answer: &str) -> Vec<(String, Reply)> {
     let mut seen = Vec::new();
     for target in ["/", "/base.css", "/base.js", "/study.css", "/study.js"] {
@@ -63,11 +63,11 @@ fn transcript(study: &mut Session, answer: &str) -> Vec<(String, Reply)> {
 }
 
 #[test]
-fn nothing_that_is_sent_depends_on_what_is_real_but_the_pixels() {
-    for (task, answer) in [(Task::YesNo, "real"), (Task::TwoAlternatives, "left")] {
+fn only_pixels_depend_on_the_labels() {
+    for (task, answer) in [(TrialDesign::YesNo, "real"), (TrialDesign::TwoAlternatives, "left")] {
         let scratch = Scratch::of_study(&format!("study-answers-{}", task.name()));
         let first = transcript(&mut open(&scratch, task), answer);
-        // The same study, of which every truth is turned round: who reads all but pixels cannot know.
+        // The same study with all labels swapped: replies other than pixels must be equal.
         let path = scratch.join("out/1/session.json");
         let mut saved: serde_json::Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
         saved["answers"] = serde_json::json!([]);
@@ -94,14 +94,14 @@ fn nothing_that_is_sent_depends_on_what_is_real_but_the_pixels() {
                 assert_eq!(one, other, "{target}");
             }
         }
-        assert_eq!(patches, if task == Task::YesNo { 6 } else { 12 });
+        assert_eq!(patches, if task == TrialDesign::YesNo { 6 } else { 12 });
     }
 }
 
 #[test]
-fn the_page_and_its_messages_name_no_file_and_no_truth() {
+fn the_page_names_no_files_and_no_labels() {
     let scratch = Scratch::of_study("study-words");
-    let mut study = open(&scratch, Task::YesNo);
+    let mut study = open(&scratch, TrialDesign::YesNo);
     let seen = transcript(&mut study, "synthetic");
     let lengths: std::collections::BTreeSet<usize> =
         seen.iter().filter(|(target, _)| target.starts_with("/patch/")).map(|(_, reply)| reply.body.len()).collect();
@@ -118,15 +118,15 @@ fn the_page_and_its_messages_name_no_file_and_no_truth() {
             assert!(!text.contains(word), "{target} leads elsewhere: {word}");
         }
     }
-    // Now it may.
+    // After the last answer the result is available.
     let result: serde_json::Value = serde_json::from_slice(&get(&mut study, "/result").body).unwrap();
     assert_eq!(result["row"]["counts"], serde_json::json!({ "tp": 0, "fp": 0, "tn": 2, "fn": 2 }));
 }
 
 #[test]
-fn only_known_things_are_answered() {
+fn unknown_requests_are_rejected() {
     let scratch = Scratch::of_study("study-routes");
-    let mut study = open(&scratch, Task::YesNo);
+    let mut study = open(&scratch, TrialDesign::YesNo);
     for target in [
         "/index.html",
         "//",
@@ -164,9 +164,9 @@ fn only_known_things_are_answered() {
 }
 
 #[test]
-fn nonsense_is_refused_without_a_change() {
+fn invalid_answers_change_nothing() {
     let scratch = Scratch::of_study("study-nonsense");
-    let mut study = open(&scratch, Task::YesNo);
+    let mut study = open(&scratch, TrialDesign::YesNo);
     let before = state(&mut study);
     let name = before["patches"][0].as_str().unwrap().to_owned();
     for body in [
@@ -182,7 +182,7 @@ fn nonsense_is_refused_without_a_change() {
         &said(&name, "real").replace("400.5", "1e999"),
         &said(&name, "real").replace('}', ",\"more\":1}"),
         &"[".repeat(4000),
-        &" ".repeat(LONGEST_BODY + 1),
+        &" ".repeat(MAX_BODY + 1),
     ] {
         let status = post(&mut study, "/answer", body).status;
         assert!(matches!(status, 400 | 409 | 413), "{body:.60}: {status}");

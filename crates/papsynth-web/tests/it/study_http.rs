@@ -1,4 +1,4 @@
-//! The server on loopback, spoken to byte by byte.
+//! Tests of a study over HTTP.
 
 use std::fs::read_to_string;
 use std::io::Write;
@@ -12,7 +12,7 @@ use papsynth_study::{Session, StudyParams};
 use papsynth_web::{Error, Server, serve_study};
 use serde_json::{Value, json};
 
-/// A server in a thread of its own.
+/// A server in its own thread.
 struct Running {
     port: u16,
     stop: Arc<AtomicBool>,
@@ -41,7 +41,7 @@ impl Running {
         serde_json::from_slice(&get(self.port, "/state").body).unwrap()
     }
 
-    /// Looks at the trial under way and says "real".
+    /// Shows the current trial and answers "real".
     fn go_on(&self) -> Value {
         let state = self.state();
         let name = state["patches"][0].as_str().unwrap();
@@ -68,7 +68,7 @@ impl Drop for Running {
 }
 
 #[test]
-fn a_study_survives_its_server_and_ends_with_results() {
+fn a_study_continues_after_a_restart() {
     let scratch = Scratch::of_study("http-study");
     let first = Running::start(&scratch);
     let port = first.port;
@@ -86,7 +86,7 @@ fn a_study_survives_its_server_and_ends_with_results() {
     assert_eq!(result["row"]["counts"], json!({ "tp": 3, "fp": 3, "tn": 0, "fn": 0 }));
     assert_eq!(result["row"]["accuracy"]["value"], 0.5);
     assert_eq!(result["exposure"]["median_ms"], 2000.5);
-    assert_eq!(result["claim"], json!({ "half_width": 0.05, "trials": 384 }));
+    assert_eq!(result["precision"], json!({ "half_width": 0.05, "trials": 384 }));
     let finished = Arc::clone(&second.finished);
     while finished.load(Ordering::SeqCst) == 0 {
         std::thread::yield_now();
@@ -104,7 +104,7 @@ fn a_study_survives_its_server_and_ends_with_results() {
 }
 
 #[test]
-fn whatever_is_sent_it_answers_the_next() {
+fn invalid_requests_do_not_stop_the_server() {
     let scratch = Scratch::of_study("http-garbage");
     let running = Running::start(&scratch);
     let port = running.port;
@@ -135,7 +135,7 @@ fn whatever_is_sent_it_answers_the_next() {
     }
     let long = post(port, "/answer", &" ".repeat(5000));
     assert_eq!(long.status, 413);
-    // A body that never comes, and connections that say nothing, take no place from others for good.
+    // Incomplete bodies and silent connections do not block others.
     let silent: Vec<TcpStream> = (0..8).map(|_| TcpStream::connect(("127.0.0.1", port)).unwrap()).collect();
     assert_eq!(running.state()["answered"], 0);
     let mut half = TcpStream::connect(("127.0.0.1", port)).unwrap();

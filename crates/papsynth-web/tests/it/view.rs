@@ -1,4 +1,4 @@
-//! What is answered about data sets, held against the frames that they were written from.
+//! Tests of the viewer of data sets against the frames that were written.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -8,12 +8,12 @@ use crate::support::view::{Pixels, assembled, get, half, json as ask, recipe, wr
 use papsynth::Frame;
 use papsynth::truth::{Group, LabelMap};
 use papsynth_dataset::Format;
-use papsynth_web::{Request, Site, View};
+use papsynth_web::{Request, Site, Viewer};
 use serde_json::{Value, json};
 
 const STACK: &str = "[focus]\nplanes = 3\nstep_um = 2.0\n";
 
-/// A plane in 8 bits.
+/// Returns a plane as 8-bit values.
 fn expected(frame: &Frame, plane: usize) -> Pixels {
     let (view, plane) = (frame.finished.scene.view, &frame.planes[plane]);
     let white = (1_u32 << frame.finished.scene.camera.bits) - 1;
@@ -34,27 +34,27 @@ fn tiles_are_the_pixels_of_every_plane_in_every_format() {
     ];
     for (name, formats, settings, planes) in cases {
         let scratch = Scratch::new(&format!("tiles-{name}"));
-        // More than are kept decoded, where that costs little.
+        // More frames than the cache holds, where that is cheap.
         let count = if name == "folder" { 5 } else { 2 };
         let frames = write(&scratch.join("set"), &recipe(settings), &formats, count);
-        let mut view = View::open(&scratch.join("set")).unwrap();
+        let mut view = Viewer::open(&scratch.join("set")).unwrap();
         let info = ask(&mut view, "/info");
         assert_eq!(
             info,
-            json!({ "title": "set", "kind": "data set", "pictures": count, "groups": ["cytoplasm", "nucleus", "debris"] })
+            json!({ "title": "set", "kind": "data set", "images": count, "groups": ["cytoplasm", "nucleus", "debris"] })
         );
         for number in (0..frames.len()).chain([0]) {
-            let picture = ask(&mut view, &format!("/picture/{number}"));
+            let image = ask(&mut view, &format!("/image/{number}"));
             assert_eq!(
-                (&picture["width"], &picture["levels"], &picture["tile"]),
+                (&image["width"], &image["levels"], &image["tile"]),
                 (&json!(300), &json!(2), &json!(256))
             );
-            let planes_um: Vec<f64> = serde_json::from_value(picture["planes_um"].clone()).unwrap();
+            let planes_um: Vec<f64> = serde_json::from_value(image["planes_um"].clone()).unwrap();
             assert_eq!(planes_um, frames[number].finished.scene.planes_um, "{name}");
             for plane in (0..planes.max(1)).rev() {
-                let whole = assembled(&mut view, &picture, &format!("tile/{number}/{plane}"), 0);
+                let whole = assembled(&mut view, &image, &format!("tile/{number}/{plane}"), 0);
                 assert!(whole == expected(&frames[number], plane), "{name} {number} {plane}");
-                let next = assembled(&mut view, &picture, &format!("tile/{number}/{plane}"), 1);
+                let next = assembled(&mut view, &image, &format!("tile/{number}/{plane}"), 1);
                 assert!(next == half(&whole), "{name} {number} {plane}");
             }
             assert_eq!(get(&mut view, &format!("/tile/{number}/{}/0/0-0.png", planes.max(1))).status, 404);
@@ -63,20 +63,20 @@ fn tiles_are_the_pixels_of_every_plane_in_every_format() {
 }
 
 #[test]
-fn a_stack_without_its_planes_is_one_picture_with_everything_in_focus() {
+fn a_stack_without_planes_is_one_image() {
     let scratch = Scratch::new("sharp");
     let frames = write(&scratch.join("set"), &recipe(STACK), &[Format::YoloSeg], 1);
-    let mut view = View::open(&scratch.join("set")).unwrap();
-    let picture = ask(&mut view, "/picture/0");
-    assert_eq!(picture["planes_um"], json!([]));
-    let whole = assembled(&mut view, &picture, "tile/0/0", 0);
+    let mut view = Viewer::open(&scratch.join("set")).unwrap();
+    let image = ask(&mut view, "/image/0");
+    assert_eq!(image["planes_um"], json!([]));
+    let whole = assembled(&mut view, &image, "tile/0/0", 0);
     let sharp = &frames[0].finished.all_in_focus;
     let far = whole.bytes.iter().zip(sharp).filter(|(byte, sharp)| (f32::from(**byte) - **sharp).abs() > 0.51).count();
     assert_eq!(far, 0);
     assert_eq!(get(&mut view, "/tile/0/1/0/0-0.png").status, 404);
 }
 
-/// Opacity and colour of every pixel of labels, by hand; the colour of an id is what is seen of it first.
+/// Checks opacity and colour of every label pixel against a direct implementation.
 fn check_labels(found: &Pixels, ids: &LabelMap, step: usize, colours: &mut BTreeMap<u32, Vec<u8>>) {
     let id = |x: usize, y: usize| ids.ids[y * step * ids.width + x * step];
     for (y, x) in (0..found.height).flat_map(|y| (0..found.width).map(move |x| (y, x))) {
@@ -94,19 +94,19 @@ fn check_labels(found: &Pixels, ids: &LabelMap, step: usize, colours: &mut BTree
 }
 
 #[test]
-fn labels_and_what_lies_under_a_pixel_are_the_truth() {
+fn labels_and_objects_at_a_pixel_match_the_ground_truth() {
     let scratch = Scratch::new("labels");
     let frames = write(&scratch.join("set"), &recipe(STACK), &[Format::Webdataset], 3);
-    let mut view = View::open(&scratch.join("set")).unwrap();
+    let mut view = Viewer::open(&scratch.join("set")).unwrap();
     let mut counts = [0_usize; 4];
     for (number, frame) in frames.iter().enumerate() {
         let truth = &frame.finished.truth;
-        let picture = ask(&mut view, &format!("/picture/{number}"));
+        let image = ask(&mut view, &format!("/image/{number}"));
         let mut colours = BTreeMap::new();
         for group in Group::ALL {
             for level in 0..2 {
                 let layer = format!("label/{number}/{}", group.name());
-                let found = assembled(&mut view, &picture, &layer, level);
+                let found = assembled(&mut view, &image, &layer, level);
                 check_labels(&found, &truth.labels(group), 1 << level, &mut colours);
             }
         }
@@ -126,7 +126,7 @@ fn labels_and_what_lies_under_a_pixel_are_the_truth() {
                     .find(|own| object["id"] == own.id && object["part"] == serde_json::to_value(own.part).unwrap());
                 let own = own.unwrap();
                 assert_eq!(object["class"], own.class.as_str());
-                assert_eq!(object["front"], holds(&own.front));
+                assert_eq!(object["visible"], holds(&own.visible));
                 let depth = object["depth_um"].as_f64().unwrap();
                 assert!((depth - own.depth_um).abs() < 1e-9 && depth <= before);
                 assert_eq!(object["defocus_um"].as_array().unwrap().len(), 3);
@@ -138,10 +138,10 @@ fn labels_and_what_lies_under_a_pixel_are_the_truth() {
 }
 
 #[test]
-fn whatever_is_asked_there_is_an_answer() {
+fn every_request_gets_a_reply() {
     let scratch = Scratch::new("targets");
     write(&scratch.join("set"), &recipe(STACK), &[Format::Folder], 1);
-    let mut view = View::open(&scratch.join("set")).unwrap();
+    let mut view = Viewer::open(&scratch.join("set")).unwrap();
     let huge = "9".repeat(16_000);
     let deep = "/tile".repeat(3000);
     for target in [
@@ -157,19 +157,19 @@ fn whatever_is_asked_there_is_an_answer() {
         "/INFO",
         "/view.js/..",
         "*",
-        "/picture",
-        "/picture/",
-        "/picture/1",
-        "/picture/-1",
-        "/picture/+0",
-        "/picture/0x0",
-        "/picture/ 0",
-        "/picture/0/..",
-        "/picture/999999999",
-        "/picture/18446744073709551616",
-        "/picture/\u{662}",
-        "/picture/0\0",
-        "/picture/%30",
+        "/image",
+        "/image/",
+        "/image/1",
+        "/image/-1",
+        "/image/+0",
+        "/image/0x0",
+        "/image/ 0",
+        "/image/0/..",
+        "/image/999999999",
+        "/image/18446744073709551616",
+        "/image/\u{662}",
+        "/image/0\0",
+        "/image/%30",
         "/tile/0/0/0",
         "/tile/0/0/0/0-0",
         "/tile/0/0/0/0-0.PNG",
@@ -210,7 +210,7 @@ fn whatever_is_asked_there_is_an_answer() {
         "/at/0/1.5/0",
         "/at/0/NaN/0",
         "/at/0/999999999/999999999",
-        &format!("/picture/{huge}"),
+        &format!("/image/{huge}"),
         &format!("/at/0/{huge}/0"),
         &deep,
         "/\u{e9}\u{20ac}",
@@ -229,7 +229,7 @@ fn whatever_is_asked_there_is_an_answer() {
 }
 
 #[test]
-fn a_damaged_file_is_told_of_and_the_rest_goes_on() {
+fn a_damaged_file_is_reported_and_others_are_shown() {
     let scratch = Scratch::new("damaged");
     let set = scratch.join("set");
     write(&set, &recipe(""), &[Format::Folder], 6);
@@ -238,12 +238,12 @@ fn a_damaged_file_is_told_of_and_the_rest_goes_on() {
         (1, "images/000001.png", "/tile/1/0/0/0-0.png"),
         (2, "shards/000002.coco.json", "/label/2/nucleus/0/0-0.png"),
         (3, "shards/000003.coco.json", "/at/3/5/5"),
-        (4, "shards/000004.json", "/picture/4"),
+        (4, "shards/000004.json", "/image/4"),
     ];
     for (number, name, target) in files {
         let path = set.join(name);
         let bytes = fs::read(&path).unwrap_or_else(|error| panic!("{name}: {error}"));
-        let mut view = View::open(&set).unwrap();
+        let mut view = Viewer::open(&set).unwrap();
         let kept = [&bytes[..bytes.len() / 2], b"", b"{}", &[0xff; 99]];
         for broken in kept {
             fs::write(&path, broken).unwrap();
@@ -260,21 +260,21 @@ fn a_damaged_file_is_told_of_and_the_rest_goes_on() {
         fs::write(&path, &bytes).unwrap();
         assert_eq!(get(&mut view, target).status, 200, "{name} {number} mended");
     }
-    // Another frame's picture, of another size.
+    // The image of another frame, with another size.
     let mut narrow = recipe("");
     narrow.field.width_px = 200.0.into();
     write(&scratch.join("small"), &narrow, &[Format::Folder], 1);
     fs::copy(scratch.join("small/images/000000.png"), set.join("images/000001.png")).unwrap();
-    let mut view = View::open(&set).unwrap();
+    let mut view = Viewer::open(&set).unwrap();
     let reply = get(&mut view, "/tile/1/0/0/0-0.png");
     assert!(reply.status == 500 && String::from_utf8_lossy(&reply.body).contains("200 x 270"), "{reply:?}");
 }
 
 #[test]
-fn the_page_loads_nothing_from_elsewhere() {
+fn the_page_loads_nothing_from_other_servers() {
     let scratch = Scratch::new("page");
     write(&scratch.join("set"), &recipe(""), &[Format::Folder], 1);
-    let mut view = View::open(&scratch.join("set")).unwrap();
+    let mut view = Viewer::open(&scratch.join("set")).unwrap();
     for (target, content_type) in [
         ("/", "text/html"),
         ("/base.css", "text/css"),
@@ -293,19 +293,19 @@ fn the_page_loads_nothing_from_elsewhere() {
 }
 
 #[test]
-fn what_is_no_data_set_is_told_of() {
+fn a_folder_without_data_set_is_reported() {
     let scratch = Scratch::new("stranger");
-    let refusal = |name: &str| View::open(&scratch.join(name)).err().unwrap();
-    assert!(refusal("missing").to_string().contains("no such folder"));
+    let error = |name: &str| Viewer::open(&scratch.join(name)).err().unwrap();
+    assert!(error("missing").to_string().contains("no such folder"));
     fs::create_dir(scratch.join("empty")).unwrap();
-    assert!(refusal("empty").to_string().contains("neither a data set nor a slide"));
+    assert!(error("empty").to_string().contains("neither a data set nor a slide"));
     fs::create_dir(scratch.join("broken")).unwrap();
     fs::write(scratch.join("broken/manifest.json"), "{").unwrap();
-    assert!(refusal("broken").to_string().contains("manifest.json"));
+    assert!(error("broken").to_string().contains("manifest.json"));
     fs::create_dir(scratch.join("slide")).unwrap();
     fs::write(scratch.join("slide/slide.json"), "{").unwrap();
-    let said = refusal("slide").to_string();
+    let said = error("slide").to_string();
     let due = if cfg!(feature = "zarr") { "slide.json" } else { "--features zarr" };
     assert!(said.contains(due), "{said}");
-    assert!(!refusal("slide").is_io());
+    assert!(!error("slide").is_io());
 }

@@ -1,4 +1,4 @@
-//! A data set over HTTP.
+//! Tests of the viewer over HTTP.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -6,13 +6,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::support::view::{Pixels, recipe, write};
 use crate::support::{Scratch, send};
 use papsynth_dataset::Format;
-use papsynth_web::{Server, View};
+use papsynth_web::{Server, Viewer};
 
 #[test]
-fn a_browser_of_this_machine_gets_page_and_tiles_and_others_nothing() {
+fn local_pages_get_tiles_and_other_sites_get_nothing() {
     let scratch = Scratch::new("http");
     write(&scratch.join("set"), &recipe(""), &[Format::Folder], 1);
-    let view = View::open(&scratch.join("set")).unwrap();
+    let view = Viewer::open(&scratch.join("set")).unwrap();
     let server = Server::bind(0).unwrap();
     let port = server.port();
     let stop = Arc::<AtomicBool>::default();

@@ -1,4 +1,4 @@
-//! What is answered about slides, held against what the engine makes.
+//! Tests of the viewer of slides against the engine.
 
 #![cfg(feature = "zarr")]
 
@@ -11,12 +11,12 @@ use papsynth::model::Model;
 use papsynth::truth::Group;
 use papsynth::{Engine, Inputs, Threads};
 use papsynth_dataset::slide::{SlideInfo, SlideRun, SlideSet};
-use papsynth_dataset::{Check, Share};
-use papsynth_web::View;
+use papsynth_dataset::{Check, Task};
+use papsynth_web::Viewer;
 use serde_json::json;
 
 #[test]
-fn a_slide_is_shown_as_far_as_it_is_made() {
+fn an_incomplete_slide_is_shown() {
     let scratch = Scratch::new("slide");
     let path = scratch.join("slide");
     let mut recipe = papsynth::recipe::Recipe::default();
@@ -28,39 +28,39 @@ fn a_slide_is_shown_as_far_as_it_is_made() {
     let info = SlideInfo { recipe: &recipe, model: &model, seed: SEED, shard_px: 512, objects_parquet: false };
     let set = SlideSet::create_or_resume(&path, &slide, &info).unwrap();
     let stop = AtomicBool::new(false);
-    let make = |share: Share| {
-        let run = SlideRun { share, threads: Threads::All, check: Check::Sizes, stop: &stop };
-        assert!(!set.make(&slide, &run, &|_| ()).unwrap());
+    let make = |share: Task| {
+        let run = SlideRun { task: share, threads: Threads::All, check: Check::Sizes, stop: &stop };
+        assert!(!set.generate(&slide, &run, &|_| ()).unwrap());
     };
-    make(Share { index: 1, of: 2 });
-    let mut view = View::open(&path).unwrap();
+    make(Task { index: 1, total: 2 });
+    let mut view = Viewer::open(&path).unwrap();
     assert_eq!(view.kind(), "slide");
-    let picture = ask(&mut view, "/picture/0");
-    assert_eq!((&picture["levels"], &picture["tile"]), (&json!(1), &json!(512)), "the upper levels come last");
-    // Shards alternate: the first is missing, so are the margins of those that are there.
+    let image = ask(&mut view, "/image/0");
+    assert_eq!((&image["levels"], &image["tile"]), (&json!(1), &json!(512)), "the upper levels come last");
+    // Every other shard is missing, and with it the margins of the others.
     for layer in ["tile/0/0", "label/0/nucleus"] {
-        let status = |view: &mut View, name: &str| get(view, &format!("/{layer}/0/{name}.png")).status;
+        let status = |view: &mut Viewer, name: &str| get(view, &format!("/{layer}/0/{name}.png")).status;
         assert_eq!(status(&mut view, "0-0"), 404, "{layer}");
         assert_eq!(status(&mut view, "0-1"), 200, "{layer}");
         assert_eq!(status(&mut view, "1-0"), 200, "{layer}");
     }
     assert_eq!(get(&mut view, "/at/0/5/5").status, 404);
-    make(Share::ALL);
+    make(Task::ALL);
     set.finish(Check::Sizes).unwrap();
-    let picture = ask(&mut view, "/picture/0");
-    assert_eq!(picture["levels"], json!(3));
-    assert_eq!(ask(&mut view, "/info")["pictures"], 1);
+    let image = ask(&mut view, "/image/0");
+    assert_eq!(image["levels"], json!(3));
+    assert_eq!(ask(&mut view, "/info")["images"], 1);
     let whole = slide.picture([0, 0], [1300, 700], Threads::All).unwrap();
     let bytes = whole.planes[0].grey.iter().map(|&grey| u8::try_from(grey).unwrap()).collect();
     let mut expected = Pixels { width: 1300, height: 700, channels: 1, bytes };
     for level in 0..3 {
-        assert!(assembled(&mut view, &picture, "tile/0/0", level) == expected, "{level}");
+        assert!(assembled(&mut view, &image, "tile/0/0", level) == expected, "{level}");
         expected = half(&expected);
     }
     for (group, labels) in Group::ALL.into_iter().zip(&whole.labels) {
         for level in 0..3 {
             let step = 1 << level;
-            let found = assembled(&mut view, &picture, &format!("label/0/{}", group.name()), level);
+            let found = assembled(&mut view, &image, &format!("label/0/{}", group.name()), level);
             let id = |x: usize, y: usize| labels.ids[y * step * 1300 + x * step];
             for (y, x) in (0..found.height).flat_map(|y| (0..found.width).map(move |x| (y, x))) {
                 let four = [[x.wrapping_sub(1), y], [x + 1, y], [x, y.wrapping_sub(1)], [x, y + 1]];
@@ -79,7 +79,7 @@ fn a_slide_is_shown_as_far_as_it_is_made() {
     {
         assert_eq!(get(&mut view, target).status, 404, "{target}");
     }
-    // A damaged shard is told of, and the next is shown.
+    // A damaged shard is reported; the next one is shown.
     let shard = path.join("slide.ome.zarr/0/c/0/0");
     let bytes = fs::read(&shard).unwrap();
     for broken in [&bytes[..bytes.len() / 2], b""] {

@@ -1,4 +1,4 @@
-//! Folders of one test, and a client that sends what it is told.
+//! Temporary folders and an HTTP client for tests.
 
 pub(crate) mod view;
 
@@ -8,18 +8,18 @@ use std::net::TcpStream;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// A folder of this test alone, removed at its end.
+/// A temporary folder, removed on drop.
 pub(crate) struct Scratch(PathBuf);
 
 impl Scratch {
     pub(crate) fn new(name: &str) -> Self {
         let path = |n: u32| std::env::temp_dir().join(format!("papsynth-web-{}-{name}-{n}", std::process::id()));
-        // Tests that run beside each other may use the same name.
+        // Concurrent tests may use the same name.
         let path = (0..).map(path).find(|path| fs::create_dir(path).is_ok()).unwrap();
         Self(path)
     }
 
-    /// With folders `real` and `synthetic` of three pictures each.
+    /// Creates the folders `real` and `synthetic` with three images each.
     pub(crate) fn of_study(name: &str) -> Self {
         let scratch = Self::new(name);
         for (side, glass) in [("real", 200), ("synthetic", 230)] {
@@ -42,7 +42,7 @@ impl Drop for Scratch {
     }
 }
 
-/// Dark discs on glass.
+/// An image of dark discs on a bright background.
 fn picture(number: u32, glass: u8) -> Vec<u8> {
     const SIDE: u32 = 240;
     let disc = |x: u32, y: u32| {
@@ -61,18 +61,18 @@ fn picture(number: u32, glass: u8) -> Vec<u8> {
     out
 }
 
-/// What came back for bytes that were sent: the head as text, and the body.
+/// A reply: head as text, and body.
 pub(crate) struct Answer {
     pub(crate) status: u16,
     pub(crate) head: String,
     pub(crate) body: Vec<u8>,
 }
 
-/// Sends bytes as they are and reads until the server ends the connection.
+/// Sends raw bytes and reads until the server closes the connection.
 pub(crate) fn send(port: u16, bytes: &[u8]) -> Answer {
     let mut stream = TcpStream::connect(("127.0.0.1", port)).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(30))).unwrap();
-    // The server may have had enough before all is sent.
+    // The server may close the connection before all is sent.
     let _ = stream.write_all(bytes);
     let mut all = Vec::new();
     let _ = stream.read_to_end(&mut all);

@@ -1,4 +1,4 @@
-//! Small data sets, and questions to what shows them.
+//! Small data sets and viewer requests for tests.
 
 use std::path::Path;
 
@@ -7,19 +7,19 @@ use papsynth::model::Model;
 use papsynth::recipe::Recipe;
 use papsynth::{Engine, Frame, Inputs};
 use papsynth_dataset::{Dataset, DatasetInfo, Format, Layout};
-use papsynth_web::{Reply, Request, Site, View};
+use papsynth_web::{Reply, Request, Site, Viewer};
 use serde_json::Value;
 
 pub(crate) const SEED: u64 = 5;
 
-/// The default recipe with few cells, of fields that take more than a tile.
+/// The default recipe with few cells and fields larger than a tile.
 pub(crate) fn recipe(settings: &str) -> Recipe {
     let mut recipe: Recipe = toml::from_str(&format!("[field]\nwidth_px = 300\nheight_px = 270\n{settings}")).unwrap();
     recipe.cells.values_mut().for_each(|mix| mix.count = 1.0.into());
     recipe
 }
 
-/// Writes frames as a data set and gives them.
+/// Writes a data set and returns its frames.
 pub(crate) fn write(path: &Path, recipe: &Recipe, formats: &[Format], frames: u64) -> Vec<Frame> {
     let model = Model::builtin();
     let engine = Engine::new(recipe, &model, &Inputs::default()).unwrap();
@@ -42,17 +42,17 @@ pub(crate) fn write(path: &Path, recipe: &Recipe, formats: &[Format], frames: u6
     frames
 }
 
-pub(crate) fn get(view: &mut View, target: &str) -> Reply {
+pub(crate) fn get(view: &mut Viewer, target: &str) -> Reply {
     view.reply(&Request { method: "GET", target, ..Request::default() })
 }
 
-pub(crate) fn json(view: &mut View, target: &str) -> Value {
+pub(crate) fn json(view: &mut Viewer, target: &str) -> Value {
     let reply = get(view, target);
     assert_eq!(reply.status, 200, "{target}: {}", String::from_utf8_lossy(&reply.body));
     serde_json::from_slice(&reply.body).unwrap()
 }
 
-/// A picture of 8 bits, put together.
+/// An assembled 8-bit image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Pixels {
     pub(crate) width: usize,
@@ -76,9 +76,9 @@ impl Pixels {
     }
 }
 
-/// All tiles of a level, put together; `layer` is what stands before the level.
-pub(crate) fn assembled(view: &mut View, picture: &Value, layer: &str, level: usize) -> Pixels {
-    let number = |name: &str| usize::try_from(picture[name].as_u64().unwrap()).unwrap();
+/// Assembles all tiles of a level; `layer` is the path before the level.
+pub(crate) fn assembled(view: &mut Viewer, image: &Value, layer: &str, level: usize) -> Pixels {
+    let number = |name: &str| usize::try_from(image[name].as_u64().unwrap()).unwrap();
     let [width, height] = ["width", "height"].map(|side| number(side).div_ceil(1 << level));
     let side = number("tile");
     let mut whole: Option<Pixels> = None;
@@ -105,15 +105,15 @@ pub(crate) fn assembled(view: &mut View, picture: &Value, layer: &str, level: us
     whole.unwrap()
 }
 
-/// The same pixels at half the size, by hand.
-pub(crate) fn half(picture: &Pixels) -> Pixels {
-    let (width, height, channels) = (picture.width.div_ceil(2), picture.height.div_ceil(2), picture.channels);
+/// Halves an image: a direct implementation.
+pub(crate) fn half(image: &Pixels) -> Pixels {
+    let (width, height, channels) = (image.width.div_ceil(2), image.height.div_ceil(2), image.channels);
     let mut bytes = Vec::new();
     for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
-        let [right, lower] = [(2 * x + 1).min(picture.width - 1), (2 * y + 1).min(picture.height - 1)];
+        let [right, lower] = [(2 * x + 1).min(image.width - 1), (2 * y + 1).min(image.height - 1)];
         let four = [[2 * x, 2 * y], [right, 2 * y], [2 * x, lower], [right, lower]];
         for channel in 0..channels {
-            let sum: u32 = four.iter().map(|&[x, y]| u32::from(picture.at(x, y)[channel])).sum();
+            let sum: u32 = four.iter().map(|&[x, y]| u32::from(image.at(x, y)[channel])).sum();
             bytes.push(u8::try_from((sum + 2) / 4).unwrap());
         }
     }

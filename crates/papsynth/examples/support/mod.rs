@@ -1,13 +1,13 @@
-//! What the examples that draw pages share: pictures of frames, labels.
+//! Functions shared by the examples that draw pages: images of frames, text, PNG files.
 
-#![allow(dead_code, clippy::cast_sign_loss, reason = "no example uses all of it; numbers are small")]
+#![allow(dead_code, clippy::cast_sign_loss, reason = "each example uses only some functions; numbers are small")]
 
 use font8x8::UnicodeFonts;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{DynamicImage, Rgb, RgbImage};
 use papsynth::Frame;
 
-/// Writes a page as a PNG, as small as it gets: grey where it has no colours.
+/// Writes a page as a PNG with maximum compression; a page without colours is written as greyscale.
 pub(crate) fn save(page: RgbImage, out: &str) -> Outcome<()> {
     let coloured = page.pixels().any(|Rgb([r, g, b])| r != g || g != b);
     let page = DynamicImage::from(page);
@@ -17,14 +17,14 @@ pub(crate) fn save(page: RgbImage, out: &str) -> Outcome<()> {
     Ok(())
 }
 
-/// What an example's steps give.
+/// The result of a step of an example.
 pub(crate) type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
-/// Height of a line of letters of size 1, with the space about it.
+/// Line height of text of size 1, px.
 pub(crate) const LINE: u32 = 12;
 
-/// The first plane of a frame, in colours.
-pub(crate) fn picture(frame: &Frame) -> RgbImage {
+/// Returns the first plane of a frame as an RGB image.
+pub(crate) fn to_image(frame: &Frame) -> RgbImage {
     let (view, plane) = (frame.finished.scene.view, &frame.planes[0]);
     RgbImage::from_fn(view.width as u32, view.height as u32, |x, y| {
         let at = (y as usize * view.width + x as usize) * plane.channels;
@@ -33,21 +33,21 @@ pub(crate) fn picture(frame: &Frame) -> RgbImage {
     })
 }
 
-/// A part of a picture about a place, as large as asked for, moved where it would leave the picture.
-pub(crate) fn around(whole: &RgbImage, [x, y]: [f64; 2], [width, height]: [u32; 2]) -> RgbImage {
+/// Crops an image to a size around a point, shifted to stay inside the image.
+pub(crate) fn crop_around(whole: &RgbImage, [x, y]: [f64; 2], [width, height]: [u32; 2]) -> RgbImage {
     let corner =
-        |middle: f64, side: u32, length: u32| ((middle - f64::from(side) / 2.0).max(0.0) as u32).min(length - side);
+        |centre: f64, side: u32, length: u32| ((centre - f64::from(side) / 2.0).max(0.0) as u32).min(length - side);
     let (x, y) = (corner(x, width, whole.width()), corner(y, height, whole.height()));
     image::imageops::crop_imm(whole, x, y, width, height).to_image()
 }
 
-/// A picture so many times as large.
-pub(crate) fn enlarged(picture: &RgbImage, zoom: u32) -> RgbImage {
+/// Enlarges an image by an integer factor.
+pub(crate) fn enlarged(image: &RgbImage, zoom: u32) -> RgbImage {
     let filter = image::imageops::FilterType::CatmullRom;
-    image::imageops::resize(picture, picture.width() * zoom, picture.height() * zoom, filter)
+    image::imageops::resize(image, image.width() * zoom, image.height() * zoom, filter)
 }
 
-/// Writes a line of letters of eight by eight dots.
+/// Writes a line of text in characters of 8 x 8 dots.
 pub(crate) fn write(page: &mut RgbImage, text: &str, [left, top]: [u32; 2], dot: u32) {
     for (place, letter) in (0_u32..).zip(text.chars()) {
         let rows = font8x8::BASIC_FONTS.get(letter).or_else(|| font8x8::LATIN_FONTS.get(letter)).unwrap_or_default();

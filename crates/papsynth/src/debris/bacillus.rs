@@ -1,17 +1,17 @@
-//! Rod-shaped bacteria ("Bacilli"): short bent lines of even width with round ends, some in chains.
+//! Rod-shaped bacteria ("Bacilli"): short bent rods with round ends, some in chains.
 
 use super::prelude::*;
 
 section! {
     /// Rod-shaped bacteria ("Bacilli"), such as lactobacilli.
     pub struct Bacilli, drawn from rng as pub Bacillus {
-        /// Number of clusters; drawn once a field.
-        clusters: Count (undrawn) = Number::log_normal(4.0, 0.8), 0..=100000;
-        /// Bacilli of a cluster.
+        /// Number of clusters; drawn once per field.
+        clusters: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(45.0, 0.8)), 0..=100000, "per field or per mm²";
+        /// Bacilli per cluster.
         per_cluster: Count (undrawn) = Number::log_normal(9.0, 0.9).at_least(1.0), 1..=10000;
         /// Radius (standard deviation) of a cluster.
-        cluster_um: Number (undrawn) = Number::uniform(5.0, 16.0), 0..=1000, "µm";
-        /// Share of the clusters that lie on a cell.
+        cluster_radius_um: Number (undrawn) = Number::uniform(5.0, 16.0), 0..=1000, "µm";
+        /// Fraction of the clusters that are on a cell.
         on_cells: Number (undrawn) = 0.85, 0..=1;
         /// Length of a bacillus.
         length_um: Number = Number::log_normal(2.6, 0.35), 0.3..=50, "µm";
@@ -19,46 +19,46 @@ section! {
         width_um: Number = Number::normal(0.6, 0.05), 0.1..=5, "µm";
         /// Bend of a bacillus.
         bend_deg: Number = Number::uniform(0.0, 35.0), 0..=120, "degrees between its ends";
-        /// Share of the bacilli that hang together in chains of two to four.
+        /// Fraction of the bacilli that are in chains of two to four.
         chained: Number (given usize as rods: "Number of rods in a chain.") = 0.12, 0..=1;
         /// Absorbance.
         absorbance: Number = Number::log_normal(0.09, 0.35), 0..=4;
-        /// How late light comes through a bacillus; seen by bright-field optics alone.
+        /// Phase delay; has an effect only with bright-field optics.
         phase_rad: Number (given f64) = Number::uniform(0.1, 0.25), -3..=3, "radians of phase";
     }
 }
 
-/// Chains have this many rods at most.
-const LONGEST_CHAIN: usize = 4;
+/// Maximum number of rods in a chain.
+const MAX_CHAIN: usize = 4;
 
 impl Bacilli {
-    pub(super) fn draw(&self, ground: &mut Ground<'_, Bacillus>) {
+    pub(super) fn draw(&self, placer: &mut KindPlacer<'_, Bacillus>) {
         let clusters = Clusters {
             purpose: "cluster",
             on_cells: &self.on_cells,
-            radius_um: &self.cluster_um,
+            radius_um: &self.cluster_radius_um,
             members: &self.per_cluster,
-            spread_um: 0.3,
+            depth_sd_um: 0.3,
         };
-        ground.strew_in_clusters(named!(self.clusters), &clusters, |ground, number, rng| {
-            let mut own = ground.stream(number, "chain");
+        placer.place_in_clusters(named!(self.clusters), &clusters, |placer, number, rng| {
+            let mut own = placer.stream(number, "chain");
             let chained = random::chance(self.chained.draw(&mut own), &mut own);
             Bacillus {
-                rods: if chained { 2 + random::below(LONGEST_CHAIN - 1, &mut own) } else { 1 },
-                phase_rad: self.phase_rad.draw(&mut ground.stream(number, "phase")),
+                rods: if chained { 2 + random::below(MAX_CHAIN - 1, &mut own) } else { 1 },
+                phase_rad: self.phase_rad.draw(&mut placer.stream(number, "phase")),
                 ..self.one(rng)
             }
         });
     }
 }
 
-/// Straight parts of a bent rod.
+/// Straight segments of a bent rod.
 const PARTS: usize = 6;
 
 /// Standard deviation of the angle between the rods of a chain, radians.
 const KINK: f64 = 0.35;
 
-/// Width of a chain between two rods, relative to the rods': there the wall has grown in.
+/// Width of a chain between two rods, relative to the rods.
 const WAIST: f64 = 0.7;
 
 impl Bacillus {
@@ -66,11 +66,11 @@ impl Bacillus {
         self.rods.max(1) as f64 * (1.2 * self.length_um + self.width_um)
     }
 
-    pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
-        let half_width = 0.5 * site.px(self.width_um);
-        let length = site.px((self.length_um - self.width_um).max(0.0));
+    pub(super) fn phantom(&self, context: &ObjectContext<'_>) -> Phantom {
+        let half_width = 0.5 * context.px(self.width_um);
+        let length = context.px((self.length_um - self.width_um).max(0.0));
         let bend = self.bend_deg.to_radians();
-        let mut rng = site.stream("chain.shape");
+        let mut rng = context.stream("chain.shape");
         let mut rods: Vec<Vec<Point>> = vec![spine(length, bend)];
         for _ in 1..self.rods {
             let size = random::between(0.8, 1.2, &mut rng);
@@ -81,13 +81,13 @@ impl Bacillus {
         let middle = rods.iter().flatten().fold([0.0; 2], |sum, p| [sum[0] + p[0], sum[1] + p[1]]);
         let count = (self.rods * (PARTS + 1)) as f64;
         let middle = if self.rods > 1 { middle.map(|sum| sum / count) } else { [0.0; 2] };
-        let turn = site.rotation_deg.to_radians();
+        let turn = context.rotation_deg.to_radians();
         for point in rods.iter_mut().flatten() {
-            *point = placed([point[0] - middle[0], point[1] - middle[1]], turn, site.centre);
+            *point = placed([point[0] - middle[0], point[1] - middle[1]], turn, context.centre);
         }
         let mut coverage = Tile::around(rods.iter().flatten(), half_width + 2.0);
         coverage.for_each(|p, value| {
-            // A pixel is covered as far as the rod's edge reaches into it.
+            // Coverage of a pixel from the distance of its centre to the edge of the rod.
             let nearest = rods
                 .iter()
                 .flat_map(|rod| rod.windows(2))
@@ -96,20 +96,20 @@ impl Bacillus {
         });
         let mut tile = coverage.clone();
         for value in &mut tile.values {
-            *value *= self.absorbance.max(LEAST_ABSORBANCE) as f32;
+            *value *= self.absorbance.max(MIN_ABSORBANCE) as f32;
         }
         let (length_um, width_um) = (self.length_um, self.width_um);
         let area = (length_um - width_um).max(0.0) * width_um + core::f64::consts::FRAC_PI_4 * width_um * width_um;
         let area_px = match self.rods {
-            1 => area / (site.pixel_um * site.pixel_um),
+            1 => area / (context.pixel_um * context.pixel_um),
             _ => coverage.values.iter().map(|share| f64::from(*share)).sum(),
         };
-        let dyes = site.dyes.bacillus;
-        Phantom::whole(tile, coverage, area_px, dyes).refracting(self.phase_rad, self.absorbance)
+        let dyes = context.dyes.bacillus;
+        Phantom::whole(tile, coverage, area_px, dyes).with_phase(self.phase_rad, self.absorbance)
     }
 }
 
-/// The middle line of a rod: an arc of a circle about the origin.
+/// Returns the centre line of a rod: a circular arc centred on the origin.
 fn spine(length: f64, bend: f64) -> Vec<Point> {
     let mut points = vec![[0.0, 0.0]];
     let step = length / PARTS as f64;
@@ -127,7 +127,7 @@ fn spine(length: f64, bend: f64) -> Vec<Point> {
     points
 }
 
-/// A rod that goes on where another ends, at an angle to it and a gap behind it.
+/// Returns a rod appended to another one at an angle, after a gap.
 fn appended(before: &[Point], next: &[Point], kink: f64, gap: f64) -> Vec<Point> {
     let [a, b] = [before[before.len() - 2], before[before.len() - 1]];
     let heading = libm::atan2(b[1] - a[1], b[0] - a[0]) + kink;
@@ -137,7 +137,7 @@ fn appended(before: &[Point], next: &[Point], kink: f64, gap: f64) -> Vec<Point>
     next.iter().map(|p| placed([p[0] - first[0], p[1] - first[1]], heading - lead, start)).collect()
 }
 
-/// Distance from a point to a straight part.
+/// Returns the distance from a point to a line segment.
 fn distance(p: Point, a: Point, b: Point) -> f64 {
     let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
     let length = dx * dx + dy * dy;

@@ -1,48 +1,50 @@
-//! Bare nuclei: nuclei of intermediate cells that have lost their cytoplasm but for faint shreds.
+//! Bare nuclei: nuclei of intermediate cells without cytoplasm except for faint shreds.
 
 use super::prelude::*;
 
 section! {
-    /// Bare nuclei: what bacteria leave of intermediate cells.
+    /// Bare nuclei: nuclei of intermediate cells after lysis by bacteria.
     pub struct BareNuclei, drawn from rng as pub BareNucleus {
-        /// Number of nuclei; drawn once a field.
-        count: Count (undrawn) = Number::log_normal(0.5, 0.9), 0..=100000;
-        /// Share of the nuclei that lie on a cell.
+        /// Number of nuclei; drawn once per field.
+        count: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(5.0, 0.9)), 0..=100000, "per field or per mm²";
+        /// Fraction of the nuclei that are on a cell.
         on_cells: Number (undrawn) = 0.15, 0..=1;
-        /// Radius of the disc of the same area.
+        /// Radius of a disc of the same area.
         radius_um: Number = Number::normal(3.7, 0.35), 1..=20, "µm";
         /// Length relative to width.
         elongation: Number = Number::uniform(1.05, 1.5), 1..=4;
-        /// Absorbance, before the field's stain of nuclei.
+        /// Absorbance, before the nuclear stain factor of the field.
         absorbance: Number = Number::normal(0.34, 0.05), 0..=4;
-        /// Contrast of its chromatin relative to the absorbance.
+        /// Contrast of chromatin relative to the absorbance.
         texture: Number = Number::uniform(0.08, 0.18), 0..=2;
-        /// Absorbance of the shreds of cytoplasm round it.
+        /// Absorbance of the surrounding shreds of cytoplasm.
         shreds: Number = Number::uniform(0.0, 0.06), 0..=4;
     } also {
-        /// Dyes of the shreds where their absorbance is 1.
+        /// Amounts of dye of the shreds where the absorbance is 1.
         dyes: Amounts,
     }
 }
 
 impl BareNuclei {
-    pub(super) fn draw(&self, ground: &mut Ground<'_, BareNucleus>) {
-        let dyes = ground.cyanophilic();
-        let stain = ground.nuclear_stain();
-        ground.strew_on_cells(named!(self.count), &self.on_cells, |rng| {
+    pub(super) fn draw(&self, placer: &mut KindPlacer<'_, BareNucleus>) {
+        let dyes = placer.cyanophilic();
+        let stain = placer.nuclear_stain();
+        placer.place_on_cells(named!(self.count), &self.on_cells, |rng| {
             let nucleus = self.one(rng);
             BareNucleus { absorbance: nucleus.absorbance * stain, dyes, ..nucleus }
         });
     }
 }
 
-/// Width of the dark rim, µm, and how much darker it is.
+/// Width of the dark rim, µm.
 const RIM_UM: f64 = 0.45;
+/// Relative increase of absorbance in the rim.
 const RIM: f32 = 0.15;
 
 /// Size (standard deviation) of clumps of chromatin, µm.
 const CLUMP_UM: f64 = 0.35;
 
+/// Number of shreds of cytoplasm.
 const SHREDS: usize = 7;
 
 impl BareNucleus {
@@ -50,31 +52,32 @@ impl BareNucleus {
         (1.8 * self.elongation.max(1.0 / self.elongation).sqrt()).max(2.8) * self.radius_um
     }
 
-    pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
-        let mut rng = site.stream("shape");
+    pub(super) fn phantom(&self, context: &ObjectContext<'_>) -> Phantom {
+        let mut rng = context.stream("shape");
         let stretch = self.elongation.sqrt();
-        let shape = wobbled_circle(self.radius_um, 0.04, 0.08, &mut rng);
+        let shape = perturbed_circle(self.radius_um, 0.04, 0.08, &mut rng);
         let scaled = |by: f64| -> Vec<Point> {
-            shape.iter().map(|p| site.place([by * stretch * p[0], by * p[1] / stretch])).collect()
+            shape.iter().map(|p| context.to_grid([by * stretch * p[0], by * p[1] / stretch])).collect()
         };
         let outline = scaled(1.0);
-        let mut nucleus = site.painting(&outline, 1.2 * self.radius_um);
+        let mut nucleus = context.canvas(&outline, 1.2 * self.radius_um);
         nucleus.coverage.cover(&outline);
         let mut inner = nucleus.coverage.blank();
         inner.cover(&scaled((1.0 - RIM_UM / self.radius_um).max(0.0)));
-        nucleus
-            .layered(&inner.values, |cover, inner| self.absorbance as f32 * (cover + RIM * (cover - inner).max(0.0)));
-        let look = Look::clouds(site.px(CLUMP_UM), &mut rng);
-        nucleus.texture(site.pools.clouds(), &look, self.texture as f32);
+        nucleus.shade_by_coverage(&inner.values, |cover, inner| {
+            self.absorbance as f32 * (cover + RIM * (cover - inner).max(0.0))
+        });
+        let sampler = FieldSampler::clouds(context.px(CLUMP_UM), &mut rng);
+        nucleus.texture(context.noise_fields.clouds(), &sampler, self.texture as f32);
         let mut shreds = nucleus.blank();
         for _ in 0..SHREDS {
             let (angle, reach) = (random::direction(&mut rng), self.radius_um * random::between(1.0, 1.8, &mut rng));
             let ends = [0.7 * self.radius_um, reach];
             let bend = angle + 0.3 * random::normal(&mut rng);
-            let ends = ends.map(|r| site.place([r * libm::cos(bend), r * libm::sin(angle)]));
-            let half_width = site.px(self.radius_um * random::between(0.12, 0.45, &mut rng));
+            let ends = ends.map(|r| context.to_grid([r * libm::cos(bend), r * libm::sin(angle)]));
+            let half_width = context.px(self.radius_um * random::between(0.12, 0.45, &mut rng));
             shreds.stroke(&Stroke { ends, half_widths: [half_width, 0.4 * half_width] }, self.shreds);
         }
-        nucleus.finish(site.dyes.nucleus, 0.0, self.absorbance).stained(shreds.absorbance, self.dyes)
+        nucleus.into_phantom(context.dyes.nucleus, 0.0, self.absorbance).with_inclusion(shreds.absorbance, self.dyes)
     }
 }

@@ -1,7 +1,7 @@
-//! Clue cells: epithelial cells covered with coccobacilli, densely at their rim and beyond it.
+//! Clue cells: epithelial cells covered with coccobacilli, most densely at the rim and beyond it.
 //!
-//! The coat is no object of its own: it follows the folds and tongues of its cell, lies at the cell's depth, and the
-//! cell's row in the truth has the trait `clue`.
+//! The coat of bacteria is part of its cell: it follows the outline and folds of the cell and has its depth. The row of
+//! the cell in the ground truth has the trait `clue`.
 
 use super::prelude::*;
 use crate::scene::view::FieldNumbers;
@@ -9,14 +9,14 @@ use crate::scene::view::FieldNumbers;
 section! {
     /// Clue cells: cells covered with coccobacilli, and cells with patches of them.
     pub struct ClueCells, drawn from rng as pub Coat {
-        /// Share of the cells that carry a coat; drawn once a field.
-        share: Number (undrawn) = Number::log_normal(0.004, 1.3).at_most(0.8), 0..=1;
-        /// Coccobacilli per µm² where a coat is dense.
+        /// Fraction of cells with a coat; drawn once per field.
+        fraction: Number (undrawn) = Number::log_normal(0.004, 1.3).at_most(0.8), 0..=1;
+        /// Coccobacilli per µm² in dense regions of a coat.
         density: Number = Number::uniform(1.5, 4.5), 0..=10;
-        /// Share of the cell that the dense patches of its coat cover.
-        cover: Number = Number::uniform(0.35, 0.95), 0..=1;
-        /// How far the coat reaches beyond the cell's rim.
-        beyond_um: Number = Number::uniform(0.8, 3.0), 0..=20, "µm";
+        /// Fraction of the cell that the dense patches of its coat cover.
+        coverage: Number = Number::uniform(0.35, 0.95), 0..=1;
+        /// Width of the coat beyond the rim of the cell.
+        overhang_um: Number = Number::uniform(0.8, 3.0), 0..=20, "µm";
         /// Width of a coccobacillus.
         width_um: Number = Number::normal(0.6, 0.04), 0.1..=5, "µm";
         /// Absorbance.
@@ -25,15 +25,15 @@ section! {
 }
 
 impl ClueCells {
-    /// Gives cells, by their numbers, their coats.
+    /// Draws the coats of cells, which are given with their numbers.
     pub(crate) fn draw<'a>(&self, field: &FieldNumbers, cells: impl Iterator<Item = (u64, &'a mut Option<Coat>)>) {
-        let share = field.draw(named!("debris.clue_cells", self.share));
-        if share <= 0.0 {
+        let fraction = field.draw(named!("debris.clue_cells", self.fraction));
+        if fraction <= 0.0 {
             return;
         }
         for (number, coat) in cells {
             let mut rng = field.key.stream("cell", number, "coat");
-            *coat = random::chance(share, &mut rng).then(|| self.one(&mut rng));
+            *coat = random::chance(fraction, &mut rng).then(|| self.one(&mut rng));
         }
     }
 }
@@ -41,44 +41,46 @@ impl ClueCells {
 /// Size (standard deviation) of the patches of a coat, µm.
 const PATCH_UM: f64 = 3.0;
 
-/// How dense a coat is between its patches, along the rim, and how dense the patches are.
+/// Density of a coat between its patches, relative to the patches.
 const THIN: f64 = 0.08;
+/// Density along the rim, relative to the patches.
 const RIM: f64 = 0.5;
 
-/// How fast a patch thickens from its border inwards, for each standard deviation of the field it is cut from.
+/// Increase of density from the border of a patch inwards, per standard deviation of the noise field.
 const SOFT: f64 = 1.2;
 
-/// Size (standard deviation) of the tufts beyond the rim, µm, and how dense it is between them.
+/// Size (standard deviation) of the tufts beyond the rim, µm.
 const TUFT_UM: f64 = 0.8;
+/// Density between the tufts, relative to them.
 const TUFTED: f64 = 0.15;
 
-/// Distance over which a coat thickens towards the rim, µm.
+/// Distance over which the density increases towards the rim, µm.
 const RIM_UM: f64 = 2.0;
 
-/// Lays its coat on a cell.
-pub(crate) fn cover(coat: &Coat, site: &Site<'_>, phantom: &mut Phantom) {
+/// Adds the coat of a cell to its phantom.
+pub(crate) fn add_coat(coat: &Coat, context: &ObjectContext<'_>, phantom: &mut Phantom) {
     let Some(cell) = phantom.pieces.first() else { return };
-    let (pools, pixel_um) = (site.pools, site.pixel_um);
-    let mut rng = site.stream("coat.shape");
-    let margin = (coat.beyond_um + RIM_UM) / pixel_um + 2.0;
-    let whole = cell.coverage.clone().repeated(cell.cover_step);
+    let (noise_fields, pixel_um) = (context.noise_fields, context.pixel_um);
+    let mut rng = context.stream("coat.shape");
+    let margin = (coat.overhang_um + RIM_UM) / pixel_um + 2.0;
+    let whole = cell.coverage.clone().repeated(cell.coverage_step);
     let corner = whole.origin.map(|at| at as f64);
     let opposite = [corner[0] + (whole.width - 1) as f64, corner[1] + (whole.height() - 1) as f64];
-    let mut painting = Painting::around(&[corner, opposite], margin);
-    let inside = widened(&whole, &painting.coverage);
+    let mut canvas = ObjectCanvas::around(&[corner, opposite], margin);
+    let inside = widened(&whole, &canvas.coverage);
     let near = |um: f64| averaged(&inside, random::count(um / pixel_um).max(1));
-    let (rim, beyond) = (near(RIM_UM), near(coat.beyond_um));
-    // Beyond the rim bacteria hang together in tufts.
-    let tufts = Look::clouds(TUFT_UM / pixel_um, &mut rng);
-    let mut tufted = Vec::with_capacity(painting.coverage.values.len());
-    painting.rows(pools.clouds(), &tufts, |_, _, _, field| tufted.extend_from_slice(field));
-    // How dense the coat is at each pixel.
-    let threshold = pools.clouds().quantile(1.0 - coat.cover);
-    let look = Look::clouds(PATCH_UM / pixel_um, &mut rng);
-    let width = painting.coverage.width;
-    let mut density = vec![0.0_f64; painting.coverage.values.len()];
+    let (rim, beyond) = (near(RIM_UM), near(coat.overhang_um));
+    // Beyond the rim, bacteria form tufts.
+    let tufts = FieldSampler::clouds(TUFT_UM / pixel_um, &mut rng);
+    let mut tufted = Vec::with_capacity(canvas.coverage.values.len());
+    canvas.rows(noise_fields.clouds(), &tufts, |_, _, _, field| tufted.extend_from_slice(field));
+    // Density of the coat at each pixel.
+    let threshold = noise_fields.clouds().quantile(1.0 - coat.coverage);
+    let sampler = FieldSampler::clouds(PATCH_UM / pixel_um, &mut rng);
+    let width = canvas.coverage.width;
+    let mut density = vec![0.0_f64; canvas.coverage.values.len()];
     let mut row = 0;
-    painting.rows(pools.clouds(), &look, |_, _, _, field| {
+    canvas.rows(noise_fields.clouds(), &sampler, |_, _, _, field| {
         for (x, patch) in field.iter().enumerate() {
             let at = row * width + x;
             let covered = f64::from(inside.values[at]);
@@ -90,8 +92,8 @@ pub(crate) fn cover(coat: &Coat, site: &Site<'_>, phantom: &mut Phantom) {
         }
         row += 1;
     });
-    let origin = painting.coverage.origin.map(|at| at as f64);
-    let height = painting.coverage.height();
+    let origin = canvas.coverage.origin.map(|at| at as f64);
+    let height = canvas.coverage.height();
     let tries = random::count(coat.density * (width * height) as f64 * pixel_um * pixel_um);
     let half_width = 0.5 * coat.width_um / pixel_um;
     for _ in 0..tries {
@@ -102,23 +104,23 @@ pub(crate) fn cover(coat: &Coat, site: &Site<'_>, phantom: &mut Phantom) {
         let at = [x as f64 + origin[0] + random::uniform(&mut rng), y as f64 + origin[1] + random::uniform(&mut rng)];
         let (way, length) = (random::direction(&mut rng), half_width * random::between(0.0, 2.0, &mut rng));
         let end = [at[0] + length * libm::cos(way), at[1] + length * libm::sin(way)];
-        painting.stroke(&Stroke::even(at, end, half_width), coat.absorbance * random::between(0.6, 1.3, &mut rng));
+        canvas.stroke(&Stroke::even(at, end, half_width), coat.absorbance * random::between(0.6, 1.3, &mut rng));
     }
-    *phantom = core::mem::take(phantom).stained(painting.absorbance, site.dyes.bacillus);
+    *phantom = core::mem::take(phantom).with_inclusion(canvas.absorbance, context.dyes.bacillus);
     phantom.traits.push(Trait::Clue);
 }
 
-/// A tile on the place of a wider one.
+/// Copies a tile to a blank tile of the size and position of a larger one.
 fn widened(tile: &Tile, place: &Tile) -> Tile {
     let mut wide = place.blank();
     let origin = wide.origin;
-    crate::phantom::tile::lay(&mut wide.values, place.width, origin, tile, |row, values| {
+    crate::phantom::tile::overlay(&mut wide.values, place.width, origin, tile, |row, values| {
         row.copy_from_slice(values);
     });
     wide
 }
 
-/// Means over squares of 2·radius + 1.
+/// Returns the mean over squares of 2·radius + 1 pixels.
 fn averaged(tile: &Tile, radius: usize) -> Tile {
     let mut out = tile.clone();
     let (width, height) = (tile.width, tile.height());

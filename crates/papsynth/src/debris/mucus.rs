@@ -1,53 +1,55 @@
-//! Strands of mucus: long bundles of faint parallel fibres.
+//! Mucus: long bundles of faint parallel fibres.
 
 use super::prelude::*;
 
 section! {
-    /// Strands of mucus, bundles of faint fibres.
+    /// Strands of mucus: bundles of faint fibres.
     pub struct Mucus, drawn from rng as pub Strand {
-        /// Number of strands; drawn once a field.
-        strands: Count (undrawn) = Number::log_normal(0.3, 0.8), 0..=10000;
-        /// Share of the strands that lie on a cell.
+        /// Number of strands; drawn once per field.
+        strands: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(2.4, 0.8)), 0..=10000, "per field or per mm²";
+        /// Fraction of the strands that are on a cell.
         on_cells: Number (undrawn) = 0.3, 0..=1;
         /// Length of a strand.
         length_um: Number = Number::log_normal(40.0, 0.45).at_least(10.0).at_most(150.0), 5..=400, "µm";
         /// Width of a strand.
         width_um: Number = Number::log_normal(5.0, 0.4), 1..=100, "µm";
-        /// Fibres across a strand.
+        /// Fibres per strand.
         fibres: Count = Number::uniform(6.0, 20.0), 1..=200;
         /// Width of a fibre.
-        fibre_um: Number = Number::uniform(0.4, 1.1), 0.1..=5, "µm";
+        fibre_width_um: Number = Number::uniform(0.4, 1.1), 0.1..=5, "µm";
         /// Absorbance of a fibre.
         absorbance: Number = Number::log_normal(0.05, 0.4), 0..=4;
-        /// How late light comes through a fibre; seen by bright-field optics alone.
+        /// Phase delay; has an effect only with bright-field optics.
         phase_rad: Number = Number::uniform(0.0, 0.12), -3..=3, "radians of phase";
-        /// Its dyes.
+        /// Dyes.
         dyes: DyeAmounts = DyeAmounts { light_green: 2.5, eosin_y: 0.5, ..DyeAmounts::none() };
     }
 }
 
 impl Mucus {
-    pub(super) fn draw(&self, ground: &mut Ground<'_, Strand>) {
-        let dyes = ground.dyes(&self.dyes);
-        ground.strew_on_cells(named!(self.strands), &self.on_cells, |rng| Strand { dyes, ..self.one(rng) });
+    pub(super) fn draw(&self, placer: &mut KindPlacer<'_, Strand>) {
+        let dyes = placer.dyes(&self.dyes);
+        placer.place_on_cells(named!(self.strands), &self.on_cells, |rng| Strand { dyes, ..self.one(rng) });
     }
 }
 
-/// Straight parts of a strand.
+/// Straight segments of a strand.
 const PARTS: usize = 40;
 
-/// Standard deviation of the bend from part to part, radians.
+/// Standard deviation of the change of direction per segment, radians.
 const BEND: f64 = 0.03;
 
-/// Absorbance of what lies between the fibres relative to them, how cloudy that is, and the size of its clouds, µm.
+/// Absorbance between the fibres, relative to them.
 const VEIL: f64 = 0.3;
+/// Strength of the texture between the fibres.
 const CLOUDY: f32 = 0.8;
+/// Size (standard deviation) of that texture, µm.
 const CLOUD_UM: f64 = 0.7;
 
-/// Share of the length over which either end thins out.
+/// Fraction of the length over which each end tapers.
 const TAPER: f64 = 0.3;
 
-/// Narrowest place of a strand relative to its width: where it was drawn out.
+/// Minimum width of a strand relative to its nominal width.
 const NECK: f64 = 0.35;
 
 impl Strand {
@@ -55,8 +57,8 @@ impl Strand {
         0.8 * self.length_um + self.width_um
     }
 
-    pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
-        let mut rng = site.stream("shape");
+    pub(super) fn phantom(&self, context: &ObjectContext<'_>) -> Phantom {
+        let mut rng = context.stream("shape");
         let step = self.length_um / PARTS as f64;
         let (mut at, mut way, mut bend) = ([0.0, 0.0], 0.0, 0.0);
         let mut spine: Vec<(Point, f64)> = Vec::with_capacity(PARTS + 1);
@@ -68,7 +70,7 @@ impl Strand {
         }
         let middle = spine[PARTS / 2].0;
         let waves: [f64; 3] = core::array::from_fn(|_| random::direction(&mut rng));
-        // The strand's half-width along its length.
+        // Half-width along the strand.
         let half: Vec<f64> = (0..=PARTS)
             .map(|i| {
                 let t = i as f64 / PARTS as f64;
@@ -79,7 +81,7 @@ impl Strand {
             .collect();
         let mut fibres: Vec<Vec<Point>> = Vec::with_capacity(self.fibres);
         for _ in 0..self.fibres {
-            // Fibres keep their place across the strand, more or less; some begin late or end early.
+            // Fibres run parallel to the strand with small deviations; some are shorter than the strand.
             let mut across = random::between(-1.0, 1.0, &mut rng);
             let first = if random::chance(0.5, &mut rng) { 0 } else { random::below(PARTS / 2, &mut rng) };
             let last = if random::chance(0.5, &mut rng) { PARTS } else { PARTS - random::below(PARTS / 2, &mut rng) };
@@ -88,26 +90,26 @@ impl Strand {
                     across = (across + 0.06 * random::normal(&mut rng)).clamp(-1.0, 1.0);
                     let ([x, y], way) = spine[i];
                     let off = across * half[i];
-                    site.place([x - middle[0] - off * libm::sin(way), y - middle[1] + off * libm::cos(way)])
+                    context.to_grid([x - middle[0] - off * libm::sin(way), y - middle[1] + off * libm::cos(way)])
                 })
                 .collect();
             fibres.push(fibre);
         }
-        let mut painting = site.painting(fibres.iter().flatten(), self.fibre_um + 0.5 * self.width_um);
+        let mut canvas = context.canvas(fibres.iter().flatten(), self.fibre_width_um + 0.5 * self.width_um);
         for (part, half) in spine.windows(2).zip(half.windows(2)) {
-            let ends = [part[0].0, part[1].0].map(|p| site.place([p[0] - middle[0], p[1] - middle[1]]));
-            let half_widths = [site.px(half[0]), site.px(half[1])];
-            painting.line(&Stroke { ends, half_widths }, VEIL * self.absorbance);
+            let ends = [part[0].0, part[1].0].map(|p| context.to_grid([p[0] - middle[0], p[1] - middle[1]]));
+            let half_widths = [context.px(half[0]), context.px(half[1])];
+            canvas.stroke_max(&Stroke { ends, half_widths }, VEIL * self.absorbance);
         }
-        let look = Look::clouds(site.px(CLOUD_UM), &mut rng);
-        painting.texture(site.pools.clouds(), &look, CLOUDY);
+        let sampler = FieldSampler::clouds(context.px(CLOUD_UM), &mut rng);
+        canvas.texture(context.noise_fields.clouds(), &sampler, CLOUDY);
         for fibre in &fibres {
-            let half_width = site.px(0.5 * self.fibre_um * random::between(0.6, 1.3, &mut rng));
+            let half_width = context.px(0.5 * self.fibre_width_um * random::between(0.6, 1.3, &mut rng));
             let strength = self.absorbance * random::between(0.4, 1.4, &mut rng);
             for part in fibre.windows(2) {
-                painting.line(&Stroke::even(part[0], part[1], half_width), strength);
+                canvas.stroke_max(&Stroke::even(part[0], part[1], half_width), strength);
             }
         }
-        painting.finish(self.dyes, self.phase_rad, self.absorbance)
+        canvas.into_phantom(self.dyes, self.phase_rad, self.absorbance)
     }
 }

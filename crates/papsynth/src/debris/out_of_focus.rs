@@ -1,19 +1,19 @@
-//! Objects far outside the depth of the slide ("Out of focus objects"): shaped and textured like leukocytes.
+//! Objects far outside the depth of the specimen ("Out of focus objects"), with the shape and texture of leukocytes.
 
 use super::prelude::*;
 
 section! {
-    /// Objects far outside the depth of the slide ("Out of focus objects").
+    /// Objects far outside the depth of the specimen ("Out of focus objects").
     pub struct OutOfFocus, drawn from rng as pub Blob {
-        /// Number of objects; drawn once a field.
-        count: Count (undrawn) = Number::uniform(0.0, 3.0), 0..=100000;
+        /// Number of objects; drawn once per field.
+        count: Abundance (undrawn) = Abundance::per_mm2(Number::uniform(0.0, 34.0)), 0..=100000, "per field or per mm²";
         /// Radius (s of Eq. 7).
         radius_um: Number = Number::log_normal(9.0, 0.5), 0.3..=500, "µm";
         /// Range of the radial perturbation (α of Eq. 7).
         alpha: Number = 0.15, 0..=0.5;
         /// Range of the angular perturbation (β of Eq. 7).
         beta: Number = 0.2, 0..=0.5, "radians";
-        /// Distance from the middle of the slide, above or below it.
+        /// Distance above or below the centre of the specimen.
         depth_um: Number (undrawn) = Number::uniform(14.0, 40.0), 0..=1000, "µm";
         /// Absorbance.
         absorbance: Number = Number::uniform(0.04, 0.16), 0..=4;
@@ -21,18 +21,18 @@ section! {
 }
 
 impl OutOfFocus {
-    pub(super) fn draw(&self, ground: &mut Ground<'_, Blob>) {
+    pub(super) fn draw(&self, placer: &mut KindPlacer<'_, Blob>) {
         let depth = |rng: &mut Stream| {
             let side = if random::chance(0.5, rng) { 1.0 } else { -1.0 };
             side * self.depth_um.draw(rng)
         };
-        ground.strew_anywhere(named!(self.count), |_, _, rng| self.one(rng), depth);
+        placer.place_anywhere(named!(self.count), |_, _, rng| self.one(rng), depth);
     }
 }
 
-/// Size of the cells of the Perlin noise inside, relative to the radius.
+/// Cell size of the Perlin noise, relative to the radius.
 const NOISE_CELL: f64 = 0.7;
-/// Strength of that noise relative to the absorbance.
+/// Strength of the noise relative to the absorbance.
 const NOISE_STRENGTH: f32 = 0.6;
 
 impl Blob {
@@ -40,18 +40,18 @@ impl Blob {
         (1.2 + 1.5 * self.alpha) * self.radius_um
     }
 
-    pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
-        let mut rng = site.stream("shape");
-        let radius = site.px(self.radius_um);
-        let turn = site.rotation_deg.to_radians();
-        let shape: Vec<Point> = wobbled_circle(radius, self.alpha, self.beta, &mut rng)
+    pub(super) fn phantom(&self, context: &ObjectContext<'_>) -> Phantom {
+        let mut rng = context.stream("shape");
+        let radius = context.px(self.radius_um);
+        let turn = context.rotation_deg.to_radians();
+        let shape: Vec<Point> = perturbed_circle(radius, self.alpha, self.beta, &mut rng)
             .iter()
-            .map(|p| placed(*p, turn, site.centre))
+            .map(|p| placed(*p, turn, context.centre))
             .collect();
         let mut coverage = Tile::around(&shape, 2.0);
         coverage.cover(&shape);
         let mut tile = coverage.clone();
-        textured(&mut tile, site.centre, NOISE_CELL * radius, 3, NOISE_STRENGTH, self.absorbance, rng.next_u64());
-        Phantom::whole(tile, coverage, area(&shape), site.dyes.nucleus)
+        textured(&mut tile, context.centre, NOISE_CELL * radius, 3, NOISE_STRENGTH, self.absorbance, rng.next_u64());
+        Phantom::whole(tile, coverage, area(&shape), context.dyes.nucleus)
     }
 }

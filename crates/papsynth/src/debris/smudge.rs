@@ -1,83 +1,83 @@
-//! Amorphous debris: greyish, granular, irregular clumps and shreds, frayed at their rims.
+//! Amorphous debris: greyish, granular, irregular clumps with frayed rims.
 
 use super::prelude::*;
 
 section! {
-    /// Amorphous debris: granular clumps of what was left of cells, mucus and bacteria.
+    /// Amorphous debris: granular clumps of remains of cells, mucus and bacteria.
     pub struct Smudges, drawn from rng as pub Smudge {
-        /// Number of clumps; drawn once a field.
-        count: Count (undrawn) = Number::log_normal(9.0, 0.8), 0..=100000;
-        /// Share of the clumps that lie on a cell.
+        /// Number of clumps; drawn once per field.
+        count: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(100.0, 0.8)), 0..=100000, "per field or per mm²";
+        /// Fraction of the clumps that are on a cell.
         on_cells: Number (undrawn) = 0.25, 0..=1;
         /// Diameter of a clump.
         diameter_um: Number = Number::log_normal(6.0, 0.65).at_least(2.0).at_most(45.0), 1..=200, "µm";
         /// Length of a clump relative to its width.
         elongation: Number = Number::log_normal(1.5, 0.3).at_least(1.0), 1..=10;
-        /// Size of its grains.
+        /// Grain size.
         grain_um: Number = Number::uniform(0.6, 1.1), 0.2..=5, "µm";
-        /// How much the grains differ from each other, relative to the absorbance.
+        /// Contrast of the grains relative to the absorbance.
         granularity: Number = Number::uniform(0.3, 0.7), 0..=2;
-        /// How ragged its outline is: 0 is an ellipse.
+        /// Irregularity of the outline: 0 is an ellipse.
         ragged: Number = Number::uniform(0.6, 1.3), 0..=2;
         /// Absorbance.
         absorbance: Number = Number::log_normal(0.05, 0.65).at_least(0.012).at_most(0.4), 0..=4;
-        /// How late light comes through it; seen by bright-field optics alone.
+        /// Phase delay; has an effect only with bright-field optics.
         phase_rad: Number = Number::uniform(0.0, 0.2), -3..=3, "radians of phase";
-        /// Its dyes.
+        /// Dyes.
         dyes: DyeAmounts = DyeAmounts { light_green: 1.0, haematein: 0.35, eosin_y: 0.6, orange_g: 0.3, neutral: 0.2 };
     }
 }
 
 impl Smudges {
-    pub(super) fn draw(&self, ground: &mut Ground<'_, Smudge>) {
-        let dyes = ground.dyes(&self.dyes);
-        ground.strew_on_cells(named!(self.count), &self.on_cells, |rng| Smudge { dyes, ..self.one(rng) });
+    pub(super) fn draw(&self, placer: &mut KindPlacer<'_, Smudge>) {
+        let dyes = placer.dyes(&self.dyes);
+        placer.place_on_cells(named!(self.count), &self.on_cells, |rng| Smudge { dyes, ..self.one(rng) });
     }
 }
 
-/// How far beyond its ellipse a clump may reach, in its radii.
-const REACH: f64 = 1.6;
+/// Maximum extent of a clump relative to its ellipse.
+const MAX_EXTENT: f64 = 1.6;
 
-/// Sizes of the waves of a ragged outline, relative to the radius, and their strengths.
+/// Size relative to the radius, and strength, of the noise fields that shape an irregular outline.
 const WAVES: [(f64, f64); 2] = [(0.42, 0.42), (0.16, 0.22)];
 
-/// Width over which the outline fades, relative to the radius: a clump is thinner at its rim.
+/// Width of the thinner rim of a clump, relative to the radius.
 const FADE: f64 = 0.35;
 
 impl Smudge {
     pub(super) fn reach_um(&self, _pixel_um: f64) -> f64 {
-        0.5 * self.diameter_um * self.elongation.sqrt() * (1.0 + (REACH - 1.0) * self.ragged.min(1.5))
+        0.5 * self.diameter_um * self.elongation.sqrt() * (1.0 + (MAX_EXTENT - 1.0) * self.ragged.min(1.5))
     }
 
-    pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
-        let mut rng = site.stream("shape");
+    pub(super) fn phantom(&self, context: &ObjectContext<'_>) -> Phantom {
+        let mut rng = context.stream("shape");
         let radius_um = 0.5 * self.diameter_um;
         let stretch = self.elongation.sqrt();
         let (a, b) = (radius_um * stretch, radius_um / stretch);
-        let reach = 1.0 + (REACH - 1.0) * self.ragged.min(1.5);
-        let corners = site.places(&[[-a, -b], [a, -b], [a, b], [-a, b]].map(|p| p.map(|v| v * reach)));
-        let mut painting = site.painting(&corners, 0.0);
-        let turn = site.rotation_deg.to_radians();
+        let reach = 1.0 + (MAX_EXTENT - 1.0) * self.ragged.min(1.5);
+        let corners = context.curve_to_grid(&[[-a, -b], [a, -b], [a, b], [-a, b]].map(|p| p.map(|v| v * reach)));
+        let mut canvas = context.canvas(&corners, 0.0);
+        let turn = context.rotation_deg.to_radians();
         let (sin, cos) = (libm::sin(turn), libm::cos(turn));
-        let (a_px, b_px) = (site.px(a), site.px(b));
-        // Where the clump is: 1 in its middle, 0 on its outline, before waves push that in and out.
-        painting.absorbance.for_each(|p: Point, value| {
-            let (dx, dy) = (p[0] - site.centre[0], p[1] - site.centre[1]);
+        let (a_px, b_px) = (context.px(a), context.px(b));
+        // A level function, 1 at the centre and 0 on the ellipse, to which noise fields are added.
+        canvas.absorbance.for_each(|p: Point, value| {
+            let (dx, dy) = (p[0] - context.centre[0], p[1] - context.centre[1]);
             let (u, v) = ((dx * cos + dy * sin) / a_px, (dy * cos - dx * sin) / b_px);
             *value = (1.0 - (u * u + v * v).sqrt()) as f32;
         });
         for (size, strength) in WAVES {
-            let look = Look::clouds(site.px(size * radius_um), &mut rng);
+            let sampler = FieldSampler::clouds(context.px(size * radius_um), &mut rng);
             let strength = (strength * self.ragged) as f32;
-            painting.rows(site.pools.clouds(), &look, |_, _, values, field| {
+            canvas.rows(context.noise_fields.clouds(), &sampler, |_, _, values, field| {
                 values.iter_mut().zip(field).for_each(|(value, field)| *value += strength * field);
             });
         }
-        // A pixel is covered where that is above 0, and its edge is as sharp as the grid.
-        let sharpness = site.px(radius_um) as f32;
-        let grains = Look::clouds(site.px(GRAIN_SIGMA * self.grain_um), &mut rng);
+        // The clump covers pixels with a positive level; its edge is one grid point wide.
+        let sharpness = context.px(radius_um) as f32;
+        let grains = FieldSampler::clouds(context.px(GRAIN_SIGMA * self.grain_um), &mut rng);
         let (absorbance, granularity) = (self.absorbance as f32, self.granularity as f32);
-        painting.rows(site.pools.clouds(), &grains, |_, covers, values, field| {
+        canvas.rows(context.noise_fields.clouds(), &grains, |_, covers, values, field| {
             for ((cover, value), grain) in covers.iter_mut().zip(values).zip(field) {
                 let inside = *value;
                 *cover = (inside * sharpness + 0.5).clamp(0.0, 1.0);
@@ -85,21 +85,21 @@ impl Smudge {
                 *value = absorbance * fade * (1.0 + granularity * grain).max(0.0);
             }
         });
-        within(&mut painting, site, a.max(b) * reach);
-        painting.finish(self.dyes, self.phase_rad, self.absorbance)
+        crop(&mut canvas, context, a.max(b) * reach);
+        canvas.into_phantom(self.dyes, self.phase_rad, self.absorbance)
     }
 }
 
-/// Standard deviation of a field whose grains are so large, relative to their diameter.
+/// Standard deviation of the noise field relative to the grain size.
 const GRAIN_SIGMA: f64 = 0.42;
 
-/// Cuts off what waves have carried beyond the reach of a clump.
-fn within(painting: &mut Painting, site: &Site<'_>, reach_um: f64) {
-    let reach = site.px(reach_um);
-    let values = &mut painting.absorbance.values;
+/// Removes parts of a clump beyond its maximum radius.
+fn crop(canvas: &mut ObjectCanvas, context: &ObjectContext<'_>, reach_um: f64) {
+    let reach = context.px(reach_um);
+    let values = &mut canvas.absorbance.values;
     let mut index = 0;
-    painting.coverage.for_each(|p, cover| {
-        let (dx, dy) = (p[0] - site.centre[0], p[1] - site.centre[1]);
+    canvas.coverage.for_each(|p, cover| {
+        let (dx, dy) = (p[0] - context.centre[0], p[1] - context.centre[1]);
         if dx * dx + dy * dy > reach * reach {
             *cover = 0.0;
             values[index] = 0.0;

@@ -1,13 +1,13 @@
-//! Specks of dust and stain ("Speckles"): a pixel, extended by one in a random direction, then dilated.
+//! Specks of dust and stain ("Speckles"): two adjacent pixels in a random direction, dilated.
 
 use super::prelude::*;
 
 section! {
-    /// How a speck is grown from its two pixels.
+    /// Method of dilating the two pixels of a speck.
     pub enum SpeckForm {
-        /// Round, whatever the pixels.
+        /// By a disc, independent of the pixel grid.
         Round,
-        /// The paper's: dilated by a cross of pixels, which makes diamonds.
+        /// The paper's method: by a cross of pixels, which gives diamonds.
         Dilated,
     }
 }
@@ -15,27 +15,26 @@ section! {
 section! {
     /// Specks of dust and stain ("Speckles").
     pub struct Speckles, drawn from rng as pub Speckle {
-        /// Number of speckles; drawn once a field.
-        count: Count (undrawn) = Number::log_normal(6.0, 0.7), 0..=1000000;
-        /// How it is grown from its two pixels.
+        /// Number of speckles; drawn once per field.
+        count: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(67.0, 0.7)), 0..=1000000, "per field or per mm²";
+        /// Method of dilation.
         form: SpeckForm = SpeckForm::Round;
-        /// How often a speckle is grown by a pixel to all sides (binary dilation).
+        /// Number of binary dilations.
         dilations: Count = Number::log_normal(0.35, 0.9), 0..=50;
         /// Absorbance.
         absorbance: Number = Number::log_normal(0.09, 0.6), 0..=4;
-        /// How late light comes through a speck: the halo that changes sign with focus. Seen by bright-field optics
-        /// alone.
+        /// Phase delay, which gives a halo that changes sign with focus. Has an effect only with bright-field optics.
         phase_rad: Number (given f64) = Number::normal(0.25, 0.15), -3..=3, "radians of phase";
     }
 }
 
 impl Speckles {
-    pub(super) fn draw(&self, ground: &mut Ground<'_, Speckle>) {
-        let speckle = |ground: &Ground<'_, Speckle>, number: u64, rng: &mut Stream| Speckle {
-            phase_rad: self.phase_rad.draw(&mut ground.stream(number, "phase")),
+    pub(super) fn draw(&self, placer: &mut KindPlacer<'_, Speckle>) {
+        let speckle = |placer: &KindPlacer<'_, Speckle>, number: u64, rng: &mut Stream| Speckle {
+            phase_rad: self.phase_rad.draw(&mut placer.stream(number, "phase")),
             ..self.one(rng)
         };
-        ground.strew_anywhere(named!(self.count), speckle, random::normal);
+        placer.place_anywhere(named!(self.count), speckle, random::normal);
     }
 }
 
@@ -44,11 +43,11 @@ impl Speckle {
         (self.dilations as f64 + 3.0) * pixel_um
     }
 
-    pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
-        let mut rng = site.stream("shape");
-        let pixel = site.oversampling as f64;
-        // Its pixels are those of the image, whatever grid it is drawn on.
-        let [x, y] = site.view.to_px(site.centre_um).map(libm::round);
+    pub(super) fn phantom(&self, context: &ObjectContext<'_>) -> Phantom {
+        let mut rng = context.stream("shape");
+        let pixel = context.oversampling as f64;
+        // The pixels of a speck are image pixels, independent of the drawing grid.
+        let [x, y] = context.view.to_px(context.centre_um).map(libm::round);
         let [dx, dy] = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]][random::below(4, &mut rng)];
         let seeds = [[x, y], [x + dx, y + dy]];
         let to_grid = |p: [f64; 2]| p.map(|v| (v + 0.5) * pixel - 0.5);
@@ -57,14 +56,13 @@ impl Speckle {
         coverage.for_each(|p, value| {
             let p = p.map(|v| (v + 0.5) / pixel - 0.5);
             *value = match self.form {
-                // Dilation by a cross, so often, is everything within that many steps along rows and columns.
+                // Repeated dilation by a cross gives all pixels within a city-block distance.
                 SpeckForm::Dilated => {
                     let p = p.map(libm::round);
                     let inside = seeds.iter().any(|s| (p[0] - s[0]).abs() + (p[1] - s[1]).abs() <= reach);
                     if inside { 1.0 } else { 0.0 }
                 }
-                // By a disc: everything nearer to the way between the two than the radius, its edge as far as it is
-                // covered.
+                // Dilation by a disc gives all points within a distance of the line between the two pixels.
                 SpeckForm::Round => {
                     let along = ((p[0] - x) * dx + (p[1] - y) * dy).clamp(0.0, 1.0);
                     let (ex, ey) = (p[0] - x - along * dx, p[1] - y - along * dy);
@@ -75,8 +73,8 @@ impl Speckle {
         let area = coverage.values.iter().map(|v| f64::from(*v)).sum();
         let mut tile = coverage.clone();
         for value in &mut tile.values {
-            *value *= self.absorbance.max(LEAST_ABSORBANCE) as f32;
+            *value *= self.absorbance.max(MIN_ABSORBANCE) as f32;
         }
-        Phantom::whole(tile, coverage, area, site.dyes.speckle).refracting(self.phase_rad, self.absorbance)
+        Phantom::whole(tile, coverage, area, context.dyes.speckle).with_phase(self.phase_rad, self.absorbance)
     }
 }

@@ -1,4 +1,4 @@
-//! What holds for every kind.
+//! Properties of all kinds of debris.
 
 use proptest::prelude::*;
 use serde_json::Value;
@@ -6,14 +6,14 @@ use serde_json::Value;
 use super::*;
 use crate::key::Key;
 use crate::model::Model;
-use crate::phantom::pools::PoolMaker;
+use crate::phantom::noise_fields::NoiseFieldGenerator;
 use crate::recipe::{Optics, Preset, Recipe};
 use crate::scene::{self, Object, Scene};
 use crate::truth::traits::Trait;
 
 const KEY: Key = Key { seed: 17, index: 3 };
 
-/// A small field with a few cells and this debris, on a coarse grid.
+/// Returns a recipe for a small field with a few cells and this debris, on a coarse grid.
 fn recipe(debris: Debris) -> Recipe {
     let mut recipe = Preset::Lbc.recipe();
     recipe.field.width_px = 96.0.into();
@@ -32,15 +32,15 @@ fn draw(debris: &Debris) -> Scene {
     scene::draw(&recipe(debris.clone()), &Model::builtin(), None, KEY).unwrap()
 }
 
-/// The phantoms of everything but cells.
+/// Draws the phantoms of all objects except cells.
 fn phantoms(scene: &Scene) -> Vec<(Kind, Phantom)> {
-    let maker = PoolMaker::new();
-    let pools = maker.make(scene.key);
-    let made = |object: &Object| Some((object.body.kind(), crate::phantom::debris(scene, &pools, object)?));
+    let generator = NoiseFieldGenerator::new();
+    let noise_fields = generator.fields(scene.key);
+    let made = |object: &Object| Some((object.body.kind(), crate::phantom::debris(scene, &noise_fields, object)?));
     scene.objects.iter().filter_map(made).collect()
 }
 
-/// Sets how many clusters or objects there are of a kind, of four members each; returns how many objects that makes.
+/// Sets the number of objects or clusters (with four members each) of a kind. Returns the number of objects.
 fn counted(debris: &mut Debris, kind: Kind, count: f64) -> usize {
     let Some(number) = debris.count_mut(kind) else { return 0 };
     *number = count.into();
@@ -48,7 +48,7 @@ fn counted(debris: &mut Debris, kind: Kind, count: f64) -> usize {
     for members in [
         &mut debris.leukocytes.per_cluster,
         &mut debris.bacilli.per_cluster,
-        &mut debris.dirt.per_drift,
+        &mut debris.dirt.per_cluster,
         &mut debris.trichomonads.per_group,
         &mut debris.red_cells.per_cluster,
     ] {
@@ -62,7 +62,7 @@ fn counted(debris: &mut Debris, kind: Kind, count: f64) -> usize {
 }
 
 #[test]
-fn names_are_what_is_written() {
+fn names_match_serialised_values() {
     for kind in Kind::ALL {
         assert_eq!(serde_json::to_value(kind).unwrap(), kind.name());
     }
@@ -72,7 +72,7 @@ fn names_are_what_is_written() {
 }
 
 #[test]
-fn there_are_as_many_as_asked_and_none_where_there_are_none() {
+fn counts_match_the_recipe() {
     let of_kind = |scene: &Scene, kind| scene.objects.iter().filter(|o| o.body.kind() == kind).count();
     let empty = draw(&Debris::none());
     assert_eq!(of_kind(&empty, Kind::Cell), empty.objects.len());
@@ -82,16 +82,20 @@ fn there_are_as_many_as_asked_and_none_where_there_are_none() {
         let expected = counted(&mut debris, kind, 3.0);
         let scene = draw(&debris);
         assert_eq!(of_kind(&scene, kind), expected, "{kind:?}");
-        assert_eq!(of_kind(&scene, kind) + of_kind(&scene, Kind::Cell), scene.objects.len(), "{kind:?} alone");
-        assert_eq!(scene.objects[..2], empty.objects[..2], "{kind:?} moves no cell");
+        assert_eq!(
+            of_kind(&scene, kind) + of_kind(&scene, Kind::Cell),
+            scene.objects.len(),
+            "{kind:?}: no other debris"
+        );
+        assert_eq!(scene.objects[..2], empty.objects[..2], "{kind:?} changes no cell");
     }
     let mut debris = Debris::none();
-    debris.clue_cells.share = 1.0.into();
+    debris.clue_cells.fraction = 1.0.into();
     assert!(draw(&debris).objects.iter().all(|object| object.coat.is_some()));
 }
 
 #[test]
-fn a_phantom_is_the_same_alone_and_among_others() {
+fn a_phantom_does_not_depend_on_other_objects() {
     let mut all = Debris::none();
     for kind in Kind::ALL {
         counted(&mut all, kind, 2.0);
@@ -112,7 +116,7 @@ fn a_phantom_is_the_same_alone_and_among_others() {
 }
 
 #[test]
-fn what_absorbs_is_covered_and_areas_are_those_of_the_cover() {
+fn absorbing_pixels_are_covered_and_areas_match_the_coverage() {
     let mut all = Debris::none();
     for kind in Kind::ALL {
         counted(&mut all, kind, 6.0);
@@ -121,19 +125,19 @@ fn what_absorbs_is_covered_and_areas_are_those_of_the_cover() {
         let whole = &phantom.pieces[0];
         assert!(whole.coverage.values.iter().all(|share| (0.0..=1.0).contains(share)), "{kind:?}");
         let covered: f64 = whole.coverage.values.iter().map(|share| f64::from(*share)).sum();
-        // Rods and blobs give the area of their shape, of which pixels cover as much but for rounding.
+        // Some kinds return the exact area of their shape, which differs slightly from the pixel coverage.
         assert!((whole.area_px / covered - 1.0).abs() < 0.25, "{kind:?}: {} {covered}", whole.area_px);
         let same = whole.absorbance.values.len() == whole.coverage.values.len();
         assert!(same, "{kind:?}");
         for (value, share) in whole.absorbance.values.iter().zip(&whole.coverage.values) {
             assert!(value.is_finite() && *value >= 0.0, "{kind:?}");
-            assert!(*share > 0.0 || *value == 0.0, "{kind:?} absorbs beside itself");
+            assert!(*share > 0.0 || *value == 0.0, "{kind:?} absorbs outside its coverage");
         }
     }
 }
 
 #[test]
-fn even_things_absorb_what_they_are_told() {
+fn uniform_objects_have_the_specified_absorbance() {
     let mut debris = Debris::none();
     for kind in [Kind::Bacillus, Kind::Speckle, Kind::Dirt, Kind::Crystal, Kind::Dust, Kind::Scratch] {
         counted(&mut debris, kind, 5.0);
@@ -147,13 +151,13 @@ fn even_things_absorb_what_they_are_told() {
             absorbed += f64::from(*value);
             covered += f64::from(*share);
         }
-        let told = object.body.absorbance();
-        assert!((absorbed / covered / told - 1.0).abs() < 1e-3, "{kind:?}: {} {told}", absorbed / covered);
+        let expected = object.body.absorbance();
+        assert!((absorbed / covered / expected - 1.0).abs() < 1e-3, "{kind:?}: {} {expected}", absorbed / covered);
     }
 }
 
 #[test]
-fn sizes_are_those_asked_for() {
+fn sizes_match_the_recipe() {
     let mut debris = Debris::none();
     counted(&mut debris, Kind::RedCell, 4.0);
     debris.red_cells.diameter_um = 7.0.into();
@@ -165,7 +169,7 @@ fn sizes_are_those_asked_for() {
     for (kind, phantom) in phantoms(&draw(&debris)) {
         let area_um2 = phantom.pieces[0].area_px * 0.25;
         let (least, most) = match kind {
-            // Discs are a little squeezed.
+            // Red cells are slightly elliptical.
             Kind::RedCell => (0.82 * disc(3.5), 1.05 * disc(3.5)),
             Kind::Bubble => (0.98 * disc(12.0), 1.02 * disc(12.0)),
             _ => (0.9 * disc(3.6), 1.1 * disc(3.6)),
@@ -175,17 +179,17 @@ fn sizes_are_those_asked_for() {
 }
 
 #[test]
-fn a_coat_follows_its_cell() {
+fn a_coat_belongs_to_its_cell() {
     let mut debris = Debris::none();
-    debris.clue_cells.share = 1.0.into();
-    debris.clue_cells.beyond_um = 0.0.into();
+    debris.clue_cells.fraction = 1.0.into();
+    debris.clue_cells.overhang_um = 0.0.into();
     let engine = |debris: Debris| {
         crate::Engine::new(&recipe(debris), &Model::builtin(), &crate::Inputs::default()).unwrap().frame(KEY).unwrap()
     };
     let (coated, bare) = (engine(debris), engine(Debris::none()));
     let rows = |frame: &crate::Frame| frame.finished.truth.objects.clone();
     for (coated, bare) in rows(&coated).iter().zip(&rows(&bare)) {
-        assert_eq!(coated.amodal, bare.amodal, "a coat is no part of the cell's outline");
+        assert_eq!(coated.amodal, bare.amodal, "a coat does not change the outline of the cell");
         assert!(coated.traits.contains(Trait::Clue), "{}", coated.traits);
         assert!(!bare.traits.contains(Trait::Clue));
     }
@@ -193,7 +197,7 @@ fn a_coat_follows_its_cell() {
     assert!(sum(&coated) < sum(&bare), "bacteria absorb");
 }
 
-/// Every number of a JSON value with the path to it.
+/// Collects the paths of all numbers and distributions of a JSON value.
 fn numbers(value: &Value, path: &str, found: &mut Vec<String>) {
     match value {
         Value::Number(_) => found.push(path.to_owned()),
@@ -211,7 +215,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 32, ..ProptestConfig::default() })]
 
     #[test]
-    fn whatever_a_recipe_may_hold_can_be_drawn(picks in proptest::collection::vec(0_usize..14, 400)) {
+    fn every_accepted_recipe_can_be_drawn(picks in proptest::collection::vec(0_usize..14, 400)) {
         const VALUES: [f64; 13] = [0.0, 0.02, 0.1, 0.3, 0.5, 1.0, 2.0, 5.0, 12.0, 30.0, 100.0, 500.0, -3.0];
         const FEW: f64 = 3.0;
         let mut json = serde_json::to_value(Debris::default()).unwrap();
@@ -219,7 +223,7 @@ proptest! {
         numbers(&json, "", &mut paths);
         for (path, pick) in paths.iter().zip(picks) {
             let Some(value) = VALUES.get(pick) else { continue };
-            let counts = ["count", "clusters", "colonies", "groups", "strands", "drifts", "per_", "hyphae", "yeasts", "share"];
+            let counts = ["count", "clusters", "colonies", "groups", "strands", "per_", "hyphae", "yeasts", "fraction"];
             let value = if counts.iter().any(|word| path.contains(word)) { value.min(FEW) } else { *value };
             let before = json.pointer(path).cloned().unwrap();
             *json.pointer_mut(path).unwrap() = serde_json::json!(value);
@@ -238,12 +242,12 @@ proptest! {
     }
 }
 
-/// How far from its middle something of a phantom lies, µm.
+/// Returns the largest distance of a part of a phantom from its centre, µm.
 fn reach_um(scene: &Scene, object: &Object, phantom: &Phantom) -> f64 {
     let n = scene.oversampling();
     let mut farthest = 0.0_f64;
     for piece in &phantom.pieces {
-        for (tile, step) in [(&piece.absorbance, n), (&piece.coverage, n / piece.cover_step)] {
+        for (tile, step) in [(&piece.absorbance, n), (&piece.coverage, n / piece.coverage_step)] {
             let grid = crate::scene::View { pixel_um: scene.view.pixel_um / step as f64, ..scene.view };
             let centre = grid.to_px(object.centre_um);
             let mut index = 0;
@@ -260,31 +264,31 @@ fn reach_um(scene: &Scene, object: &Object, phantom: &Phantom) -> f64 {
 }
 
 #[test]
-fn hardly_anything_reaches_farther_than_it_says() {
+fn at_most_one_percent_of_debris_exceeds_its_maximum_radius() {
     for kind in Kind::ALL.into_iter().filter(|kind| *kind != Kind::Cell) {
         let mut debris = Debris::none();
         counted(&mut debris, kind, 150.0);
         let scene = draw(&debris);
-        let maker = PoolMaker::new();
-        let pools = maker.make(scene.key);
-        let (mut beyond, mut most, mut told) = (0, 0.0_f64, 0);
+        let generator = NoiseFieldGenerator::new();
+        let noise_fields = generator.fields(scene.key);
+        let (mut beyond, mut largest, mut total) = (0, 0.0_f64, 0);
         for object in &scene.objects {
-            let Some(phantom) = crate::phantom::debris(&scene, &pools, object) else { continue };
-            let says = object.body.reach_um(scene.view.pixel_um) + 2.0 * scene.view.pixel_um;
-            let share = reach_um(&scene, object, &phantom) / says;
-            (told, most) = (told + 1, most.max(share));
-            beyond += usize::from(share > 1.0);
+            let Some(phantom) = crate::phantom::debris(&scene, &noise_fields, object) else { continue };
+            let limit_um = object.body.reach_um(scene.view.pixel_um) + 2.0 * scene.view.pixel_um;
+            let ratio = reach_um(&scene, object, &phantom) / limit_um;
+            (total, largest) = (total + 1, largest.max(ratio));
+            beyond += usize::from(ratio > 1.0);
         }
-        // What reaches farther is cut off on slides.
-        assert!(beyond * 100 <= told, "{}: {beyond} of {told}", kind.name());
-        assert!(most > 0.25, "{}: {most}", kind.name());
+        // Slides crop objects at their maximum radius.
+        assert!(beyond * 100 <= total, "{}: {beyond} of {total}", kind.name());
+        assert!(largest > 0.25, "{}: {largest}", kind.name());
     }
 }
 
 #[test]
-fn hardly_a_cell_reaches_farther_than_it_says() {
+fn at_most_half_a_percent_of_cells_exceeds_its_maximum_radius() {
     let mut beyond = 0;
-    let (mut told, mut most) = (0, 0.0_f64);
+    let (mut total, mut largest) = (0, 0.0_f64);
     for preset in [Preset::Lbc, Preset::HighGrade, Preset::Endocervical, Preset::Oral, Preset::Atrophic] {
         let mut recipe = preset.recipe();
         (recipe.field.width_px, recipe.field.height_px) = (800.0.into(), 600.0.into());
@@ -292,15 +296,17 @@ fn hardly_a_cell_reaches_farther_than_it_says() {
         recipe.debris = Debris::none();
         let model = Model::builtin();
         let scene = scene::draw(&recipe, &model, None, KEY).unwrap();
-        let watch = crate::profile::Watch(None);
-        let studio = crate::phantom::Studio::new(&recipe, &model, watch).unwrap();
-        let pools = studio.pools.make(scene.key);
+        let timer = crate::profile::StageTimer(None);
+        let assets = crate::phantom::PhantomAssets::new(&recipe, &model, timer).unwrap();
+        let noise_fields = assets.noise_fields.fields(scene.key);
         let objects: Vec<&Object> = scene.objects.iter().collect();
-        for (object, phantom) in objects.iter().zip(crate::phantom::make(&studio, &scene, &pools, &objects).unwrap()) {
-            let share = reach_um(&scene, object, &phantom) / object.body.reach_um(scene.view.pixel_um);
-            (told, most) = (told + 1, most.max(share));
-            beyond += usize::from(share > 1.0);
+        for (object, phantom) in
+            objects.iter().zip(crate::phantom::make(&assets, &scene, &noise_fields, &objects).unwrap())
+        {
+            let ratio = reach_um(&scene, object, &phantom) / object.body.reach_um(scene.view.pixel_um);
+            (total, largest) = (total + 1, largest.max(ratio));
+            beyond += usize::from(ratio > 1.0);
         }
     }
-    assert!(beyond * 200 <= told && most > 0.6, "{beyond} of {told}, {most}");
+    assert!(beyond * 200 <= total && largest > 0.6, "{beyond} of {total}, {largest}");
 }

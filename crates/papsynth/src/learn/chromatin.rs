@@ -1,32 +1,32 @@
-//! The spectrum of chromatin: a Matérn covariance in the object plane, fitted through the microscope.
+//! The spectrum of chromatin: a Matérn covariance in the object plane, fitted to microscope images.
 
 use spectral_field::Spectrum;
 
-use super::nucleus::Measured;
+use super::nucleus::NucleusMeasurement;
 
 /// Lags at which the autocorrelation is compared, px.
 pub(super) const LAGS: usize = 6;
 
-/// Spread of the microscope that the material was imaged with, in µm: the paper's 0.9 px of 0.25 µm.
+/// Blur of the microscope of the material, standard deviation in µm: the paper's 0.9 px of 0.25 µm.
 const SIGMA_UM: f64 = 0.225;
 
-/// Smoothnesses that are tried.
+/// Candidate values of the smoothness ν.
 const NUS: [f64; 3] = [0.5, 1.0, 1.5];
 
-/// Mean autocorrelation at lags 1 to 6 px of textures from which a plane was subtracted.
-pub(super) fn mean_autocorrelation(measured: &[Measured]) -> [f64; LAGS] {
+/// Returns the mean autocorrelation at lags 1 to 6 px of textures after subtraction of a fitted plane.
+pub(super) fn mean_autocorrelation(nuclei: &[NucleusMeasurement]) -> [f64; LAGS] {
     let mut sums = [0.0; LAGS];
-    for nucleus in measured {
-        let rest = detrended(nucleus);
-        let variance = correlation(&rest, nucleus.width, 0);
+    for nucleus in nuclei {
+        let residual = detrended(nucleus);
+        let variance = correlation(&residual, nucleus.width, 0);
         for (lag, sum) in sums.iter_mut().enumerate() {
-            *sum += if variance > 0.0 { correlation(&rest, nucleus.width, lag + 1) / variance } else { 0.0 };
+            *sum += if variance > 0.0 { correlation(&residual, nucleus.width, lag + 1) / variance } else { 0.0 };
         }
     }
-    sums.map(|sum| sum / measured.len().max(1) as f64)
+    sums.map(|sum| sum / nuclei.len().max(1) as f64)
 }
 
-/// Mean product of pixels that lie `lag` apart along rows or columns, both inside.
+/// Returns the mean product of pixels `lag` apart along rows or columns, both inside the nucleus.
 fn correlation(values: &[f64], width: usize, lag: usize) -> f64 {
     let (mut sum, mut count) = (0.0, 0_u32);
     for i in 0..values.len() {
@@ -43,8 +43,8 @@ fn correlation(values: &[f64], width: usize, lag: usize) -> f64 {
     if count == 0 { 0.0 } else { sum / f64::from(count) }
 }
 
-/// A texture without its mean and its slope: NaN outside the nucleus.
-fn detrended(nucleus: &Measured) -> Vec<f64> {
+/// Returns a texture minus a fitted plane; NaN outside the nucleus.
+fn detrended(nucleus: &NucleusMeasurement) -> Vec<f64> {
     let width = nucleus.width;
     let inside: Vec<usize> = (0..nucleus.absorbance.len()).filter(|&i| !nucleus.absorbance[i].is_nan()).collect();
     let count = inside.len() as f64;
@@ -70,15 +70,16 @@ fn detrended(nucleus: &Measured) -> Vec<f64> {
         .collect()
 }
 
-/// The Matérn covariance whose image through the microscope comes nearest to an autocorrelation: (ν, length in µm).
+/// Returns (ν, length in µm) of the Matérn covariance whose blurred autocorrelation is nearest to a measured one.
 ///
-/// Subtracting mean and slope takes the three slowest modes out of a nucleus of `area_um2`. Modes of a window of area a
-/// lie 1/a apart in the frequency plane, so those three fill a disc of radius √(3/(π a)): the spectrum counts from there.
+/// Subtracting mean and slope removes the three lowest modes of a nucleus of `area_um2`. A window of area a has one
+/// mode per 1/a in the frequency plane, so these three fill a disc of radius √(3/(π a)), which is excluded from the
+/// spectrum.
 pub(super) fn fit_matern(measured: &[f64; LAGS], pixel_um: f64, area_um2: f64) -> (f64, f64) {
     let lowest = (3.0 / (core::f64::consts::PI * area_um2)).sqrt();
     let mut best = (f64::INFINITY, NUS[0], 0.5);
     for nu in NUS {
-        // Lengths from 0.1 to 2.5 µm in steps of three per cent.
+        // Lengths from 0.1 to 2.5 µm in steps of 3 %.
         let mut length = 0.1;
         while length < 2.5 {
             let model = imaged_autocorrelation(nu, length, pixel_um, lowest);
@@ -92,7 +93,7 @@ pub(super) fn fit_matern(measured: &[f64; LAGS], pixel_um: f64, area_um2: f64) -
     (best.1, best.2)
 }
 
-/// Autocorrelation at lags 1 to 6 px of what is left of a Matérn field above a frequency (cycles per µm) after the
+/// Returns the autocorrelation at lags 1 to 6 px of a Matérn field above a frequency (cycles per µm), blurred by the
 /// microscope's Gaussian.
 fn imaged_autocorrelation(nu: f64, length_um: f64, pixel_um: f64, lowest: f64) -> [f64; LAGS] {
     const HIGHEST: f64 = 4.0;
@@ -101,8 +102,8 @@ fn imaged_autocorrelation(nu: f64, length_um: f64, pixel_um: f64, lowest: f64) -
     let mut sums = [0.0; LAGS + 1];
     for step in 0..STEPS {
         let f = lowest + (HIGHEST - lowest) * (step as f64 + 0.5) / STEPS as f64;
-        let spread = 2.0 * core::f64::consts::PI * SIGMA_UM * f;
-        let power = spectrum.density(f) * f * libm::exp(-spread * spread);
+        let exponent = 2.0 * core::f64::consts::PI * SIGMA_UM * f;
+        let power = spectrum.density(f) * f * libm::exp(-exponent * exponent);
         for (lag, sum) in sums.iter_mut().enumerate() {
             *sum += power * libm::j0(core::f64::consts::TAU * f * lag as f64 * pixel_um);
         }
@@ -115,7 +116,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_fit_finds_the_field_it_was_made_from() {
+    fn fit_recovers_the_parameters_of_a_field() {
         for (nu, length) in [(0.5, 0.7), (1.0, 0.5)] {
             let lowest = (3.0 / (core::f64::consts::PI * 50.0)).sqrt();
             let (found_nu, found) = fit_matern(&imaged_autocorrelation(nu, length, 0.25, lowest), 0.25, 50.0);

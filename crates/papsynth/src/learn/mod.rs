@@ -1,6 +1,6 @@
-//! From real cells to a model: outlines and nucleus images in, statistics (and donors) out.
+//! Learns a model from real cells: from outlines and nucleus images to statistics and, optionally, donor textures.
 //!
-//! Nothing here reads files: images are slices, outlines are lists of points.
+//! This module reads no files: images are slices, outlines are lists of points.
 
 mod chromatin;
 mod nucleus;
@@ -10,59 +10,59 @@ use fsd_shape::{CovarianceModel, ShapeModel, ShapeModelParams};
 use crate::error::{Cause, Error};
 use crate::model::{CellClass, Donor, LogNormal, Model, Normal, Provenance, Shapes};
 
-use nucleus::Measured;
+use nucleus::NucleusMeasurement;
 pub use nucleus::{NucleusImage, Point};
 
-/// What a class is learned from. Whatever is empty is kept as the base model has it.
+/// Input for learning a class. Properties without material are copied from the base model.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Material<'a> {
-    /// Nuclei: images with masks.
+    /// Images of nuclei, with masks.
     pub nuclei: &'a [NucleusImage],
     /// Outlines of nuclei, px; taken from the masks of `nuclei` if empty.
     pub nucleus_outlines: &'a [Vec<Point>],
-    /// Outlines of whole cells, px.
+    /// Outlines of complete cells, px.
     pub cytoplasm_outlines: &'a [Vec<Point>],
 }
 
-/// Whether textures are kept.
+/// Whether the model contains textures of real nuclei.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Donors {
-    /// The textures of all nuclei become donors: the model holds pixels of real cells.
+    /// The textures of all nuclei become donors: the model contains pixels of real cells.
     Keep,
-    /// Only numbers are kept (means, covariances, spectra): nothing of a real cell can be seen in the model.
+    /// Only statistics are kept (means, covariances, spectra): the model contains no pixels of real cells.
     NumbersOnly,
 }
 
-/// How a class is learned.
+/// Parameters for learning a class.
 #[derive(Debug, Clone)]
 pub struct LearnParams {
-    /// Name of the class that is learned, or learned anew.
+    /// Name of the class to add or to replace.
     pub class: String,
-    /// Class of the base model that it takes after in everything the material does not show.
+    /// Class of the base model that supplies all properties without material.
     pub like: String,
-    /// Category of the Bethesda system; that of the base class if empty.
+    /// Category of the Bethesda system; the category of the base class if empty.
     pub bethesda: String,
-    /// Size of a pixel of the material, µm.
+    /// Pixel size of the material, µm.
     pub pixel_um: f64,
-    /// Where the material came from, for the record.
+    /// Source of the material, for the provenance record.
     pub source: String,
-    /// Whether textures are kept.
+    /// Whether the model contains textures of real nuclei.
     pub donors: Donors,
 }
 
-/// Harmonics of a cell's outline: enough for its corners.
+/// Harmonics of a cell outline: enough for its corners.
 const CYTOPLASM_HARMONICS: usize = 40;
+/// Harmonics of a nucleus outline.
 const NUCLEUS_HARMONICS: usize = 10;
-/// Fewest outlines that a covariance can be taken from.
-const FEWEST: usize = 3;
-/// Digits of every number in a model.
+/// Minimum number of outlines for a covariance.
+const MIN_OUTLINES: usize = 3;
+/// Significant digits of numbers in a model.
 const DIGITS: usize = 5;
 
-/// Learns a class and adds it to a model.
+/// Learns a class and returns the model with this class.
 ///
 /// # Errors
-/// If the material is too little or cannot be used, or the class to take after is not in the base model: it says which
-/// image or outline, and why.
+/// If there is too little material, an image or outline is invalid, or the base model has no class `like`.
 pub fn learn(base: &Model, material: &Material, params: &LearnParams) -> Result<Model, Error> {
     learned(base, material, params).map_err(|cause| Error::Learn { class: params.class.clone(), cause })
 }
@@ -91,7 +91,8 @@ fn learned(base: &Model, material: &Material, params: &LearnParams) -> Result<Mo
         class.cytoplasm.radius_um = radius;
         note("outlines of cells", material.cytoplasm_outlines.len());
     }
-    let measured: Vec<Measured> = material.nuclei.iter().map(NucleusImage::measure).collect::<Result<_, _>>()?;
+    let measured: Vec<NucleusMeasurement> =
+        material.nuclei.iter().map(NucleusImage::measure).collect::<Result<_, _>>()?;
     let traced: Vec<Vec<Point>> = measured.iter().map(|m| m.outline.clone()).collect();
     let outlines = if material.nucleus_outlines.is_empty() { &traced } else { material.nucleus_outlines };
     if !outlines.is_empty() {
@@ -112,23 +113,23 @@ fn learned(base: &Model, material: &Material, params: &LearnParams) -> Result<Mo
     Ok(model)
 }
 
-/// The outline of a mask by so many points at equal distances along it.
+/// Returns the outline of a mask as points at equal distances along it.
 ///
 /// # Errors
-/// If the mask is empty, has several components or cannot be an image: it says which.
+/// If the mask is empty, has several components, or its size is not a multiple of `width`.
 pub fn outline(mask: &[f32], width: usize, points: usize) -> Result<Vec<Point>, Cause> {
     Ok(nucleus::outline(mask, width, points)?)
 }
 
-/// Statistics of outlines in both ways, and of their size.
+/// Returns the statistics of outlines for both drawing methods, and the distribution of their radius.
 fn shapes(
     outlines: &[Vec<Point>],
     harmonics: usize,
     pixel_um: f64,
     what: &'static str,
 ) -> Result<(Shapes, LogNormal), Cause> {
-    if outlines.len() < FEWEST {
-        return Err(Cause::TooFewOutlines { found: outlines.len(), what, least: FEWEST });
+    if outlines.len() < MIN_OUTLINES {
+        return Err(Cause::TooFewOutlines { found: outlines.len(), what, least: MIN_OUTLINES });
     }
     if let Some(index) = outlines.iter().position(|outline| fsd_shape::self_intersects(outline)) {
         return Err(Cause::CrossedOutline(index, what));
@@ -146,7 +147,7 @@ fn shapes(
     Ok((Shapes { correlated, independent: fit(CovarianceModel::Independent)? }, radius))
 }
 
-fn learn_texture(class: &mut CellClass, measured: &[Measured], params: &LearnParams) {
+fn learn_texture(class: &mut CellClass, measured: &[NucleusMeasurement], params: &LearnParams) {
     let nucleus = &mut class.nucleus;
     nucleus.absorbance = normal(measured.iter().map(|m| m.mean));
     let chromatin = &mut nucleus.chromatin;
@@ -171,12 +172,12 @@ fn normal(values: impl Iterator<Item = f64> + Clone) -> Normal {
     Normal { mean: rounded(mean), sd: rounded(variance.sqrt()) }
 }
 
-/// A number with as many digits as a model keeps.
+/// Rounds a number to the significant digits of a model.
 fn rounded(value: f64) -> f64 {
     if value == 0.0 || !value.is_finite() {
         return value;
     }
-    let places = DIGITS as f64 - 1.0 - libm::floor(libm::log10(value.abs()));
-    let scale = libm::exp10(places);
+    let decimals = DIGITS as f64 - 1.0 - libm::floor(libm::log10(value.abs()));
+    let scale = libm::exp10(decimals);
     libm::round(value * scale) / scale
 }

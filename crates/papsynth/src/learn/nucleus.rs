@@ -1,4 +1,4 @@
-//! What one image of a nucleus shows.
+//! Measurements on the image of a nucleus.
 
 use crate::error::{Cause, Flaw};
 use crate::model::{Donor, OUTSIDE};
@@ -9,7 +9,7 @@ pub type Point = [f64; 2];
 /// The image of a nucleus, with its mask.
 #[derive(Debug, Clone)]
 pub struct NucleusImage {
-    /// Name for messages, such as that of its file.
+    /// Name for messages, for example the file name.
     pub name: String,
     /// Transmitted light in any linear unit, row by row.
     pub light: Vec<f32>,
@@ -19,40 +19,40 @@ pub struct NucleusImage {
     pub width: usize,
 }
 
-/// Steps of the profile from rim to centre.
-pub(super) const PROFILE: usize = 5;
+/// Number of steps of the profile from rim to centre.
+pub(super) const PROFILE_STEPS: usize = 5;
 
-/// What was measured on an image.
+/// Measurements on the image of a nucleus.
 #[derive(Debug, Clone)]
-pub(super) struct Measured {
+pub(super) struct NucleusMeasurement {
     pub(super) outline: Vec<Point>,
     pub(super) mean: f64,
     pub(super) sd: f64,
     pub(super) skewness: f64,
     /// Mean absorbance in steps from rim to centre.
-    pub(super) profile: [f64; PROFILE],
-    /// Absorbance above the surroundings; NaN outside the nucleus.
+    pub(super) profile: [f64; PROFILE_STEPS],
+    /// Absorbance relative to the surroundings; NaN outside the nucleus.
     pub(super) absorbance: Vec<f64>,
     pub(super) width: usize,
 }
 
 impl NucleusImage {
-    /// Measures absorbance inside the mask against the surroundings of the nucleus (Eq. 11): A = −log₁₀(I₁/I₀).
-    pub(super) fn measure(&self) -> Result<Measured, Cause> {
+    /// Measures absorbance inside the mask relative to the surroundings of the nucleus (Eq. 11): A = −log₁₀(I₁/I₀).
+    pub(super) fn measure(&self) -> Result<NucleusMeasurement, Cause> {
         self.measured().map_err(|flaw| Cause::Nucleus { name: self.name.clone(), flaw })
     }
 
-    fn measured(&self) -> Result<Measured, Flaw> {
+    fn measured(&self) -> Result<NucleusMeasurement, Flaw> {
         /// Points of a traced outline.
         const POINTS: usize = 64;
-        /// The rim of the nucleus reaches so far beyond its mask that the surroundings begin after it, px …
-        const GAP: f64 = 2.5;
-        /// … and end here.
-        const REACH: f64 = 9.0;
-        /// Pixels of surroundings that a median can be trusted with.
-        const FEWEST: usize = 12;
-        /// Mean absorbance below which nothing can be told from noise.
-        const FAINTEST: f64 = 0.01;
+        /// Distance from the outline at which the surroundings begin, beyond the blurred rim of the nucleus, px.
+        const SURROUNDINGS_START: f64 = 2.5;
+        /// Distance from the outline at which the surroundings end, px.
+        const SURROUNDINGS_END: f64 = 9.0;
+        /// Minimum number of pixels for a median.
+        const MIN_PIXELS: usize = 12;
+        /// Mean absorbance below which a nucleus is indistinguishable from noise.
+        const MIN_MEAN: f64 = 0.01;
         if self.width == 0 || self.light.len() != self.mask.len() || !self.light.len().is_multiple_of(self.width) {
             return Err(Flaw::Size { pixels: self.light.len(), mask: self.mask.len(), width: self.width });
         }
@@ -62,10 +62,10 @@ impl NucleusImage {
         let outline = outline(&self.mask, self.width, POINTS).map_err(Flaw::Mask)?;
         let distance = self.distances(&outline);
         let mut around: Vec<f64> = (0..self.light.len())
-            .filter(|&i| self.mask[i] < 0.5 && (GAP..REACH).contains(&distance[i]))
+            .filter(|&i| self.mask[i] < 0.5 && (SURROUNDINGS_START..SURROUNDINGS_END).contains(&distance[i]))
             .map(|i| f64::from(self.light[i]))
             .collect();
-        if around.len() < FEWEST {
+        if around.len() < MIN_PIXELS {
             return Err(Flaw::Crop(around.len()));
         }
         around.sort_by(f64::total_cmp);
@@ -73,7 +73,7 @@ impl NucleusImage {
         if surroundings <= 0.0 {
             return Err(Flaw::Black);
         }
-        // Eq. 11: A = −log₁₀(I₁/I₀) against the surroundings; black pixels count as half a step of the darkest light seen.
+        // Eq. 11: A = −log₁₀(I₁/I₀) relative to the surroundings; black pixels count as 1/512 of these.
         let floor = surroundings / 512.0;
         let absorbance: Vec<f64> = (0..self.light.len())
             .map(|i| {
@@ -83,21 +83,21 @@ impl NucleusImage {
             .collect();
         let inside: Vec<f64> = absorbance.iter().copied().filter(|a| !a.is_nan()).collect();
         let count = inside.len() as f64;
-        if inside.len() < FEWEST {
-            return Err(Flaw::SmallMask(inside.len(), FEWEST));
+        if inside.len() < MIN_PIXELS {
+            return Err(Flaw::SmallMask(inside.len(), MIN_PIXELS));
         }
         let mean = inside.iter().sum::<f64>() / count;
-        if mean < FAINTEST {
-            return Err(Flaw::Faint(mean, FAINTEST));
+        if mean < MIN_MEAN {
+            return Err(Flaw::Faint(mean, MIN_MEAN));
         }
         let moment = |power: i32| inside.iter().map(|a| libm::pow(a - mean, f64::from(power))).sum::<f64>() / count;
         let sd = moment(2).sqrt();
         let skewness = if sd > 0.0 { moment(3) / (sd * sd * sd) } else { 0.0 };
         let profile = profile(&absorbance, &distance, mean);
-        Ok(Measured { outline, mean, sd, skewness, profile, absorbance, width: self.width })
+        Ok(NucleusMeasurement { outline, mean, sd, skewness, profile, absorbance, width: self.width })
     }
 
-    /// Distance of every pixel from the outline.
+    /// Returns the distance of every pixel from the outline.
     fn distances(&self, outline: &[Point]) -> Vec<f64> {
         (0..self.light.len())
             .map(|i| {
@@ -109,35 +109,35 @@ impl NucleusImage {
     }
 }
 
-/// The outline of a mask by so many points at equal distances along it.
+/// Returns the outline of a mask as points at equal distances along it.
 pub(super) fn outline(mask: &[f32], width: usize, points: usize) -> Result<Vec<Point>, fsd_shape::Error> {
     Ok(fsd_shape::resample(&fsd_shape::trace(mask, width, crate::truth::COVERED)?, points))
 }
 
-/// Mean absorbance in steps of the distance from the rim; the overall mean where a step has no pixel.
-fn profile(absorbance: &[f64], distance: &[f64], mean: f64) -> [f64; PROFILE] {
+/// Returns the mean absorbance in steps of the distance from the rim; the overall mean for steps without pixels.
+fn profile(absorbance: &[f64], distance: &[f64], mean: f64) -> [f64; PROFILE_STEPS] {
     let inside = || absorbance.iter().zip(distance).filter(|(a, _)| !a.is_nan());
     let deepest = inside().fold(1.0_f64, |most, (_, d)| most.max(*d));
-    let mut sums = [[0.0; 2]; PROFILE];
+    let mut sums = [[0.0; 2]; PROFILE_STEPS];
     for (a, d) in inside() {
-        let step = crate::random::count((d / deepest * PROFILE as f64).floor()).min(PROFILE - 1);
+        let step = crate::random::count((d / deepest * PROFILE_STEPS as f64).floor()).min(PROFILE_STEPS - 1);
         sums[step][0] += a;
         sums[step][1] += 1.0;
     }
     sums.map(|[sum, count]| if count > 0.0 { sum / count } else { mean })
 }
 
-/// The profile of a class, relative to its mean absorbance.
-pub(super) fn mean_profile(measured: &[Measured]) -> Vec<f64> {
+/// Returns the mean profile, relative to the mean absorbance.
+pub(super) fn mean_profile(measured: &[NucleusMeasurement]) -> Vec<f64> {
     let mean: f64 = measured.iter().map(|m| m.mean).sum();
-    (0..PROFILE)
+    (0..PROFILE_STEPS)
         .map(|step| measured.iter().map(|m| m.profile[step]).sum::<f64>() / mean.max(1e-9))
         .map(|v| v.max(0.0))
         .collect()
 }
 
-impl Measured {
-    /// The texture as a donor.
+impl NucleusMeasurement {
+    /// Returns the texture as a donor.
     pub(super) fn donor(&self, pixel_um: f64) -> Donor {
         let milli = |a: &f64| {
             #[expect(clippy::cast_possible_truncation, reason = "clamped to the range of i16")]

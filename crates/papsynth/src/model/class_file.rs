@@ -1,31 +1,31 @@
-//! The model that ships, and class files: classes told by the numbers in which they differ from others.
+//! The built-in model, and class files: TOML files that define classes by their differences from other classes.
 
 use serde_json::{Map, Value};
 
 use super::{CellClass, MODEL_VERSION, Model, Provenance};
 use crate::error::{Cause, Error};
 
-/// The classes that are told from those of the model that ships, by the numbers in which they differ.
+/// Class files of the built-in model.
 const BUILTIN_CLASSES: [&str; 2] = [include_str!("../../model/cervix.toml"), include_str!("../../model/oral.toml")];
 
-/// The text of the model that ships.
+/// The learned part of the built-in model.
 const BUILTIN: &str = include_str!("../../model/default.json");
 
 impl Model {
-    /// The model that ships: numbers alone, measured on real cells.
+    /// Returns the built-in model. It contains only statistics, measured on real cells.
     ///
     /// # Panics
-    /// Never: the file is part of the crate and its tests read it.
+    /// Never: the files are part of the crate and tested.
     #[must_use]
     pub fn builtin() -> Self {
-        let learned = Self::from_json(BUILTIN).expect("the model that ships is sound");
-        BUILTIN_CLASSES.iter().fold(learned, |model, text| model.with(text).expect("the classes that ship are sound"))
+        let learned = Self::from_json(BUILTIN).expect("the built-in model is valid");
+        BUILTIN_CLASSES.iter().fold(learned, |model, text| model.with(text).expect("the built-in classes are valid"))
     }
 
-    /// This model and the classes of a text, which take the place of classes of the same names.
+    /// Returns this model with the classes of `text` added; classes with the same name are replaced.
     ///
-    /// The text is a model as `papsynth learn` writes it, or a class file: TOML whose classes may each say which class they
-    /// are `like`, and after that only the numbers in which they differ.
+    /// `text` is a model written by `papsynth learn` (JSON), or a class file (TOML). A class of a class file may name a
+    /// base class (`like`) and list only the values that differ.
     ///
     /// ```
     /// # use papsynth::model::Model;
@@ -42,13 +42,13 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// As those of [`from_json`](Self::from_json), or if a class is like one that is not there.
+    /// As [`from_json`](Self::from_json), or if the class named by `like` does not exist.
     pub fn with(&self, text: &str) -> Result<Self, Error> {
         merged(self, text).and_then(|model| model.checked().map(|()| model)).map_err(Error::Model)
     }
 }
 
-/// A model and the classes of a text.
+/// Returns a model with the classes of a text added.
 fn merged(base: &Model, text: &str) -> Result<Model, Cause> {
     let value: Value = if text.trim_start().starts_with('{') {
         serde_json::from_str(text).map_err(Cause::NotAModel)?
@@ -75,19 +75,19 @@ fn merged(base: &Model, text: &str) -> Result<Model, Cause> {
     if let Some(unknown) = file.keys().next() {
         return Err(Cause::UnknownField(unknown.clone()));
     }
-    let mut waiting = classes;
-    // A class may be like one of the same file, wherever that stands.
-    while !waiting.is_empty() {
-        let ready: Vec<String> = waiting
+    let mut unresolved = classes;
+    // `like` may name a class of the same file, before or after this one.
+    while !unresolved.is_empty() {
+        let ready: Vec<String> = unresolved
             .iter()
-            .filter(|(name, class)| like(class).is_none_or(|of| of == name.as_str() || !waiting.contains_key(of)))
+            .filter(|(name, class)| like(class).is_none_or(|of| of == name.as_str() || !unresolved.contains_key(of)))
             .map(|(name, _)| name.clone())
             .collect();
         if ready.is_empty() {
-            return Err(Cause::ClassCircle(waiting.keys().cloned().collect()));
+            return Err(Cause::ClassCircle(unresolved.keys().cloned().collect()));
         }
         for name in ready {
-            let Some(class) = waiting.remove(&name) else { continue };
+            let Some(class) = unresolved.remove(&name) else { continue };
             let class = resolved(&model, class)
                 .map_err(|cause| Cause::Class { class: name.clone(), cause: Box::new(cause) })?;
             model.classes.insert(name, class);
@@ -96,33 +96,33 @@ fn merged(base: &Model, text: &str) -> Result<Model, Cause> {
     Ok(model)
 }
 
-/// The name of the class that a class is like, if it says so.
+/// Returns the base class of a class, if any.
 fn like(class: &Value) -> Option<&str> {
     class.get("like").and_then(Value::as_str)
 }
 
 fn resolved(model: &Model, mut class: Value) -> Result<CellClass, Cause> {
-    let whole = match like(&class).map(str::to_owned) {
+    let complete = match like(&class).map(str::to_owned) {
         None => class,
         Some(of) => {
-            let mut whole = serde_json::to_value(model.class(&of)?)?;
+            let mut base = serde_json::to_value(model.class(&of)?)?;
             class.as_object_mut().map(|fields| fields.remove("like"));
-            overlay(&mut whole, class);
-            whole
+            merge(&mut base, class);
+            base
         }
     };
-    Ok(serde_json::from_value(whole)?)
+    Ok(serde_json::from_value(complete)?)
 }
 
-/// Puts the values of one table over those of another, table by table.
-fn overlay(under: &mut Value, over: Value) {
-    match (under, over) {
-        (Value::Object(under), Value::Object(over)) => {
-            for (key, value) in over {
-                overlay(under.entry(key).or_insert(Value::Null), value);
+/// Replaces values of one object by those of another, recursively.
+fn merge(base: &mut Value, changes: Value) {
+    match (base, changes) {
+        (Value::Object(base), Value::Object(changes)) => {
+            for (key, value) in changes {
+                merge(base.entry(key).or_insert(Value::Null), value);
             }
         }
-        (under, over) => *under = over,
+        (base, changes) => *base = changes,
     }
 }
 
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn a_class_says_what_is_different_and_takes_the_rest() {
+    fn a_class_inherits_the_values_it_does_not_set() {
         let text = "version = 1\n[classes.b]\nlike = \"a\"\nbethesda = \"LSIL\"\n[classes.a]\nlike = \"intermediate\"\n\
                     cytoplasm.radius_um = { median = 9.5, log_sd = 0.1 }\n";
         let model = with(text).unwrap();
@@ -143,19 +143,19 @@ mod tests {
         assert_eq!((a.cytoplasm.radius_um.median, b.cytoplasm.radius_um.median), (9.5, 9.5));
         assert_eq!((a.bethesda.as_str(), b.bethesda.as_str()), ("NILM", "LSIL"));
         assert_eq!(a.nucleus, base.nucleus);
-        // A model's own text is read as it is written.
+        // The JSON of a model can be read back.
         assert_eq!(Model::builtin().with(&model.to_json()).unwrap(), model);
     }
 
     #[test]
-    fn what_cannot_be_is_said() {
-        for (text, said) in [
+    fn invalid_class_files_are_reported() {
+        for (text, expected) in [
             ("[classes]", "version is missing"),
             ("version = 2", "version is 2"),
             ("version = 1\nclass = 3", "`class` is not known"),
             ("version = 1\nclasses = 3", "expected a table"),
             ("version = 1\n[classes.a]\nlike = \"b\"\n[classes.b]\nlike = \"a\"", "in a circle"),
-            ("version = 1\n[classes.a]\nlike = \"nobody\"", "no class `nobody`"),
+            ("version = 1\n[classes.a]\nlike = \"missing\"", "no class `missing`"),
             ("version = 1\n[classes.\"../a\"]\nlike = \"intermediate\"", "`../a` is no name"),
             ("version = 1\n[classes.\"\"]\nlike = \"intermediate\"", "`` is no name"),
             ("version = 1\n[classes.a]\nlike = \"intermediate\"\ncytoplasm.form.taper = 4", "cytoplasm.form.taper: 4"),
@@ -164,7 +164,7 @@ mod tests {
             ("{", "no model of papsynth"),
         ] {
             let message = with(text).unwrap_err();
-            assert!(message.contains(said), "{text:?}: {message}");
+            assert!(message.contains(expected), "{text:?}: {message}");
         }
     }
 }

@@ -1,8 +1,8 @@
-//! What was learned from real cells.
+//! Models: statistics of real cells.
 //!
-//! A model holds what cells of each class are like: shapes, sizes, absorbances, chromatin. It is one JSON file,
-//! readable and versioned, with the counts and the provenance of what it was learned from. The model that ships
-//! holds numbers alone (means, covariances, spectra); one that you learn may hold donors, which are pixels.
+//! A model contains the shapes, sizes, absorbances and chromatin of each class of cells. It is one versioned JSON file
+//! with the provenance of its data. The built-in model contains only statistics (means, covariances, spectra); a
+//! learned model may also contain donors, which are pixels of real nuclei.
 
 mod class_file;
 
@@ -13,34 +13,34 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Cause, Error, within};
 
-/// The version of models that this crate reads and writes.
+/// Version of the model format that this crate reads and writes.
 pub const MODEL_VERSION: u32 = 1;
 
-/// A model: what cells of each class are like.
+/// A model: statistics of each class of cells.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Model {
-    /// Version of this file's format.
+    /// Version of the file format.
     pub version: u32,
-    /// What the model was learned from, newest last.
+    /// Sources of the model, newest last.
     pub provenance: Vec<Provenance>,
-    /// The classes of cells by name.
+    /// Classes of cells by name.
     pub classes: BTreeMap<String, CellClass>,
 }
 
-/// One thing a model was learned from.
+/// One data source of a model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Provenance {
-    /// The class that was learned.
+    /// Class that was learned.
     pub class: String,
-    /// What was learned: "cytoplasm outlines", "nucleus images", …
+    /// Type of data: "outlines of cells", "images of nuclei", …
     pub what: String,
-    /// How many of them.
+    /// Number of outlines or images.
     pub count: usize,
-    /// Size of their pixels, µm.
+    /// Pixel size, µm.
     pub pixel_um: f64,
-    /// Where they came from.
+    /// Origin of the data.
     pub source: String,
 }
 
@@ -64,7 +64,7 @@ pub struct Normal {
     pub sd: f64,
 }
 
-/// What cells of one class are like.
+/// Statistics of one class of cells.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CellClass {
@@ -76,53 +76,52 @@ pub struct CellClass {
     pub nucleus: NucleusStatistics,
 }
 
-/// What the cytoplasm of a class is like.
+/// Statistics of the cytoplasm of a class.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CytoplasmStatistics {
     /// Radius of the circle of the first Fourier descriptor, |u₁|, µm.
     pub radius_um: LogNormal,
-    /// Absorbance, the median over a cell.
+    /// Median absorbance of a cell.
     pub absorbance: LogNormal,
-    /// Thickness from the rim to the middle in even steps of the distance from the rim, relative to its median.
+    /// Thickness from rim to centre in equal steps, relative to its median.
     pub rim_to_centre: Vec<f64>,
-    /// How its outlines differ from those that were learned.
-    #[serde(default, skip_serializing_if = "Form::is_plain")]
-    pub form: Form,
-    /// How readily it folds, wrinkles and lies angular, 0 (a rounded, firm cell) to 1 (a thin sheet): a factor on what the
-    /// recipe asks.
+    /// Changes to the learned outlines.
+    #[serde(default, skip_serializing_if = "OutlineForm::is_default")]
+    pub form: OutlineForm,
+    /// Factor on the recipe's folds, wrinkles and angularity, 0 (a rounded, firm cell) to 1 (a thin sheet).
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub pliability: f64,
-    /// The cleared space round the nucleus, if the class has one.
+    /// The cleared space around the nucleus, if the class has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub halo: Option<HaloStatistics>,
     /// Outlines.
     pub shapes: Shapes,
 }
 
-/// How outlines differ from those that were learned.
+/// Changes to learned outlines.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Form {
-    /// Elongation |u₋₁|/|u₁| in the place of the learned one, 0 (round) to 0.9: an ellipse of half axes 1 ± this.
+pub struct OutlineForm {
+    /// Elongation |u₋₁|/|u₁| that replaces the learned one, 0 (round) to 0.9: an ellipse with half axes 1 ± this value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub elongation: Option<Normal>,
-    /// How much wider one end is than the other, −0.3 to 0.3.
+    /// Difference in width between the two ends, −0.3 to 0.3.
     #[serde(skip_serializing_if = "is_zero")]
     pub taper: f64,
-    /// Factor on everything else about the outline, 0 (a smooth oval) to 3.
+    /// Factor on all other descriptors of the outline, 0 (a smooth oval) to 3.
     #[serde(skip_serializing_if = "is_one")]
     pub unevenness: f64,
 }
 
-impl Default for Form {
+impl Default for OutlineForm {
     fn default() -> Self {
         Self { elongation: None, taper: 0.0, unevenness: 1.0 }
     }
 }
 
-impl Form {
-    fn is_plain(&self) -> bool {
+impl OutlineForm {
+    fn is_default(&self) -> bool {
         *self == Self::default()
     }
 
@@ -135,21 +134,21 @@ impl Form {
     }
 }
 
-/// What the cleared space round the nucleus of a koilocyte is like.
+/// Statistics of the cleared space around the nucleus of a koilocyte.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HaloStatistics {
-    /// Probability that a cell has one.
+    /// Probability that a cell has a halo.
     pub probability: f64,
-    /// Its radius relative to the nucleus's.
+    /// Radius relative to the radius of the nucleus.
     pub radius: LogNormal,
-    /// Share of the cytoplasm that is missing there, 0 to 1.
+    /// Fraction of the cytoplasm that is missing in the halo, 0 to 1.
     pub clearing: Normal,
-    /// How much denser the cytoplasm is at its edge.
+    /// Relative increase of density at its edge.
     pub rim: Normal,
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde requires a reference")]
 fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
@@ -158,37 +157,37 @@ fn one() -> f64 {
     1.0
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde requires a reference")]
 fn is_one(value: &f64) -> bool {
     *value == 1.0
 }
 
-/// What the nucleus of a class is like.
+/// Statistics of the nucleus of a class.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NucleusStatistics {
     /// Radius of the circle of the first Fourier descriptor, |u₁|, µm.
     pub radius_um: LogNormal,
-    /// Correlation of the logarithms of the radii of nucleus and cell, −1 to 1.
+    /// Correlation of the log radii of nucleus and cell, −1 to 1.
     pub size_correlation: f64,
-    /// Distance of its middle from the cell's, as a fraction of the cell's radius.
+    /// Distance between the centres of nucleus and cell, as a fraction of the cell radius.
     pub off_centre: Normal,
-    /// How strictly it is displaced towards one end of the cell, as in columnar cells: 0 (in any direction) to 1.
+    /// Tendency to lie towards one end of the cell, as in columnar cells: 0 (any direction) to 1.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub polarity: f64,
-    /// Absorbance above the cytoplasm, mean over a nucleus.
+    /// Mean absorbance of a nucleus, above that of the cytoplasm.
     pub absorbance: Normal,
-    /// How its outlines differ from those that were learned.
-    #[serde(default, skip_serializing_if = "Form::is_plain")]
-    pub form: Form,
-    /// Nucleoli, on average.
+    /// Changes to the learned outlines.
+    #[serde(default, skip_serializing_if = "OutlineForm::is_default")]
+    pub form: OutlineForm,
+    /// Mean number of nucleoli.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub nucleoli: f64,
     /// Chromatin.
     pub chromatin: ChromatinStatistics,
     /// Outlines.
     pub shapes: Shapes,
-    /// Textures to take patches from; empty in a model of numbers, which makes its donors from the spectrum.
+    /// Textures for patches; empty in a model without pixels, for which donors are synthesised from the spectrum.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub donors: Vec<Donor>,
 }
@@ -205,40 +204,40 @@ pub struct ChromatinStatistics {
     pub sd: Normal,
     /// Skewness of the absorbance.
     pub skewness: f64,
-    /// Absorbance from the rim to the middle in even steps of the distance from the rim, relative to its mean.
+    /// Absorbance from rim to centre in equal steps, relative to its mean.
     pub rim_to_centre: Vec<f64>,
 }
 
-/// The statistics of a population of outlines, for either way of drawing from them.
+/// Statistics of a population of outlines, for both drawing methods.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shapes {
-    /// Aligned, with what varies together.
+    /// Aligned outlines with correlated descriptors.
     pub correlated: ShapeStatistics,
-    /// The paper's: every descriptor on its own.
+    /// The paper's method: independent descriptors.
     pub independent: ShapeStatistics,
 }
 
-/// A texture to take patches from.
+/// A texture that supplies patches.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Donor {
-    /// Size of its pixels, µm.
+    /// Pixel size, µm.
     pub pixel_um: f64,
     /// Columns.
     pub width: usize,
-    /// Absorbance above the surroundings in thousandths, row by row; −32768 outside the nucleus.
+    /// Absorbance relative to the surroundings, in thousandths, row by row; −32768 outside the nucleus.
     pub absorbance_milli: Vec<i16>,
 }
 
-/// What stands for "outside the nucleus" in a donor.
+/// Value of donor pixels outside the nucleus.
 pub const OUTSIDE: i16 = i16::MIN;
 
 impl Model {
-    /// Reads a model from its text.
+    /// Parses a model from JSON.
     ///
     /// # Errors
-    /// If the text is no model, one of another version, or one with numbers that cannot be: it says which.
+    /// If the text is not a model, has another version, or contains an invalid number.
     pub fn from_json(text: &str) -> Result<Self, Error> {
         #[derive(Deserialize)]
         struct Version {
@@ -255,10 +254,10 @@ impl Model {
         read().map_err(Error::Model)
     }
 
-    /// The text of the model.
+    /// Returns the model as JSON.
     ///
     /// # Panics
-    /// Never: strings, numbers and lists can be written as JSON.
+    /// Never: all fields can be written as JSON.
     #[must_use]
     pub fn to_json(&self) -> String {
         let mut text = serde_json::to_string(self).expect("every model can be written as JSON");
@@ -266,10 +265,10 @@ impl Model {
         text
     }
 
-    /// What is wrong with the model, if anything.
+    /// Validates the model.
     ///
     /// # Errors
-    /// The first number that cannot be, by its path, with what would be accepted.
+    /// The path and value of the first invalid number, and the accepted range.
     pub fn check(&self) -> Result<(), Error> {
         self.checked().map_err(Error::Model)
     }
@@ -284,7 +283,7 @@ impl Model {
         Ok(())
     }
 
-    /// A class by its name.
+    /// Returns a class by name.
     pub(crate) fn class(&self, name: &str) -> Result<&CellClass, Cause> {
         let known = || self.classes.keys().cloned().collect();
         self.classes.get(name).ok_or_else(|| Cause::UnknownClass(name.to_owned(), known()))
@@ -331,8 +330,8 @@ impl CellClass {
 impl Shapes {
     fn check(&self, path: &str) -> Result<(), Cause> {
         for (name, statistics) in [("correlated", &self.correlated), ("independent", &self.independent)] {
-            let sound = fsd_shape::ShapeModel::from_statistics(statistics.clone());
-            sound.map_err(|error| Cause::Shapes(format!("{path}.{name}"), error))?;
+            let valid = fsd_shape::ShapeModel::from_statistics(statistics.clone());
+            valid.map_err(|error| Cause::Shapes(format!("{path}.{name}"), error))?;
         }
         Ok(())
     }
@@ -340,11 +339,11 @@ impl Shapes {
 
 impl Donor {
     fn check(&self, field: String) -> Result<(), Cause> {
-        /// Widest donor: a nucleus of 100 µm at 0.05 µm a pixel, and then some.
-        const WIDEST: usize = 4096;
+        /// Maximum width: twice a nucleus of 100 µm with pixels of 0.05 µm.
+        const MAX_WIDTH: usize = 4096;
         within(&format!("{field}.pixel_um"), self.pixel_um, [0.05, 4.0])?;
         let pixels = self.absorbance_milli.len();
-        if self.width == 0 || self.width > WIDEST || !pixels.is_multiple_of(self.width) {
+        if self.width == 0 || self.width > MAX_WIDTH || !pixels.is_multiple_of(self.width) {
             return Err(Cause::DonorSize { field, width: self.width, pixels });
         }
         if self.absorbance_milli.iter().all(|&v| v == OUTSIDE) {

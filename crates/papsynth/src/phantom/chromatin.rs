@@ -1,4 +1,4 @@
-//! The texture inside nuclei: donors, and patches of them ("Texture synthesis", Figs. 4, 5).
+//! The texture of nuclei: donors and their patches ("Texture synthesis", Figs. 4, 5).
 
 use fsd_shape::ShapeModel;
 use quilt_texture::{QuiltParams, Quilter, Source};
@@ -10,40 +10,40 @@ use crate::key::{Key, Stream};
 use crate::model::{ChromatinStatistics, Donor, NucleusStatistics, OUTSIDE};
 use crate::random;
 
-/// Size of the pixels of donors made from a spectrum, µm: the paper's.
-const MADE_PIXEL_UM: f64 = 0.25;
+/// Pixel size of synthetic donors, µm: the paper's.
+const SYNTHETIC_PIXEL_UM: f64 = 0.25;
 
-/// Donors made from a spectrum for each class.
-const MADE_DONORS: usize = 48;
+/// Synthetic donors per class.
+const SYNTHETIC_DONORS: usize = 48;
 
-/// Spread of the microscope behind the measured standard deviations of chromatin, µm (the paper's 0.9 px).
+/// Blur of the microscope of the measured chromatin, standard deviation in µm (the paper's 0.9 px).
 const MEASURED_SIGMA_UM: f64 = 0.225;
 
-/// The donors of a class: textures of mean 0 and variance 1 inside their nuclei.
+/// The donors of a class: textures with mean 0 and variance 1 inside their nuclei.
 #[derive(Debug)]
-pub(crate) struct Donors {
+pub(crate) struct DonorSet {
     sources: Vec<Source>,
-    /// Size of their pixels, µm.
+    /// Pixel size, µm.
     pub(crate) pixel_um: f64,
     pub(crate) imaged: bool,
-    /// Factor from a standard deviation as imaged to one in the object plane.
+    /// Factor from the imaged standard deviation to that in the object plane.
     pub(crate) sharpening: f64,
-    /// Draws a whole field instead of patches.
-    field: FieldSource,
+    /// Draws one field for the complete nucleus instead of patches.
+    field: ChromatinField,
 }
 
-/// A field of the class's spectrum, with its marginal.
+/// A random field with the spectrum, skewness and radial profile of a class.
 #[derive(Debug)]
-struct FieldSource {
+struct ChromatinField {
     field: SpectralField,
     skewness: f64,
     profile: Vec<f64>,
 }
 
-impl Donors {
-    /// The donors of a class: learned ones where there are some, else made from the spectrum.
+impl DonorSet {
+    /// Creates the donors of a class: learned ones if available, else synthetic ones.
     pub(crate) fn new(name: &str, nucleus: &NucleusStatistics, shapes: &ShapeModel) -> Result<Self, Cause> {
-        let field = FieldSource::new(&nucleus.chromatin)?;
+        let field = ChromatinField::new(&nucleus.chromatin)?;
         let imaged = !nucleus.donors.is_empty();
         let (sources, pixel_um) = match nucleus.donors.first() {
             Some(first) => {
@@ -51,18 +51,18 @@ impl Donors {
                 if !same {
                     return Err(Cause::DonorPixels(name.to_owned()));
                 }
-                (nucleus.donors.iter().map(learned).collect::<Result<Vec<_>, _>>()?, first.pixel_um)
+                (nucleus.donors.iter().map(learned_source).collect::<Result<Vec<_>, _>>()?, first.pixel_um)
             }
             None => {
                 let make = |index| field.donor(name, index, nucleus, shapes);
-                ((0..MADE_DONORS as u64).map(make).collect::<Result<Vec<_>, _>>()?, MADE_PIXEL_UM)
+                ((0..SYNTHETIC_DONORS as u64).map(make).collect::<Result<Vec<_>, _>>()?, SYNTHETIC_PIXEL_UM)
             }
         };
         let sharpening = if imaged { 1.0 } else { 1.0 / blur_attenuation(&nucleus.chromatin) };
         Ok(Self { sources, pixel_um, imaged, sharpening, field })
     }
 
-    /// A texture for a nucleus by patches from some of the donors: mean 0 and variance 1 over the covered pixels.
+    /// Synthesises a texture from patches of some of the donors, with mean 0 and variance 1 over the covered pixels.
     pub(crate) fn quilt(
         &self,
         coverage: &Tile,
@@ -74,24 +74,25 @@ impl Donors {
         let chosen: Vec<&Source> =
             choose(self.sources.len(), donors, rng).into_iter().map(|i| &self.sources[i]).collect();
         let quilter = Quilter::new(&chosen, params)?;
-        let grid = Grid::new(coverage, pixel_um / self.pixel_um);
+        let grid = DonorGrid::new(coverage, pixel_um / self.pixel_um);
         Ok(grid.sample(&quilter.synthesise(&grid.mask, grid.width, rng).pixels, coverage))
     }
 
-    /// A texture for a nucleus that is a field of its own.
+    /// Draws a texture as one random field, with mean 0 and variance 1 over the covered pixels.
     pub(crate) fn field(&self, coverage: &Tile, pixel_um: f64, rng: &mut Stream) -> Vec<f32> {
-        let grid = Grid::new(coverage, pixel_um / MADE_PIXEL_UM);
+        let grid = DonorGrid::new(coverage, pixel_um / SYNTHETIC_PIXEL_UM);
         grid.sample(&self.field.texture(&grid.mask, grid.width, rng), coverage)
     }
 }
 
-/// Some of `count` things without repetition, all if there are not so many.
+/// Draws `wanted` of `count` indices without repetition, or all indices if there are fewer.
 fn choose(count: usize, wanted: usize, rng: &mut Stream) -> Vec<usize> {
-    let mut left: Vec<usize> = (0..count).collect();
-    (0..wanted.min(count)).map(|_| left.swap_remove(random::below(left.len(), rng))).collect()
+    let mut remaining: Vec<usize> = (0..count).collect();
+    (0..wanted.min(count)).map(|_| remaining.swap_remove(random::below(remaining.len(), rng))).collect()
 }
 
-fn learned(donor: &Donor) -> Result<Source, Cause> {
+/// Converts a learned donor to a source of patches.
+fn learned_source(donor: &Donor) -> Result<Source, Cause> {
     let mask: Vec<f32> = donor.absorbance_milli.iter().map(|&v| if v == OUTSIDE { 0.0 } else { 1.0 }).collect();
     let mut pixels: Vec<f32> =
         donor.absorbance_milli.iter().map(|&v| if v == OUTSIDE { 0.0 } else { f32::from(v) / 1000.0 }).collect();
@@ -99,11 +100,11 @@ fn learned(donor: &Donor) -> Result<Source, Cause> {
     Source::new(&pixels, &mask, donor.width).map_err(Cause::Donor)
 }
 
-impl FieldSource {
+impl ChromatinField {
     fn new(chromatin: &ChromatinStatistics) -> Result<Self, Cause> {
-        /// Side of the field, px: wider than any nucleus at the pixel size of made donors; it repeats.
+        /// Width and height of the periodic field, px: larger than any nucleus at the pixel size of synthetic donors.
         const SIDE: usize = 128;
-        let spectrum = Spectrum::Matern { nu: chromatin.nu, length_px: chromatin.length_um / MADE_PIXEL_UM };
+        let spectrum = Spectrum::Matern { nu: chromatin.nu, length_px: chromatin.length_um / SYNTHETIC_PIXEL_UM };
         let params = FieldParams { width: SIDE, height: SIDE, spectrum, padding: Padding::Periodic };
         Ok(Self {
             field: SpectralField::new(&params)?,
@@ -112,15 +113,15 @@ impl FieldSource {
         })
     }
 
-    /// A donor from the spectrum: the shape of a nucleus of the class, filled with its field.
+    /// Draws a synthetic donor: a nucleus shape of the class filled with its field.
     fn donor(&self, name: &str, index: u64, nucleus: &NucleusStatistics, shapes: &ShapeModel) -> Result<Source, Cause> {
-        // Donors belong to the model, not to an image: their key is the same for every data set.
+        // Donors are part of the model, so their key does not depend on the image.
         let mut rng = Key { seed: 0, index: 0 }.stream(&format!("donor/{name}"), index, "made");
-        let radius =
-            nucleus.radius_um.median * libm::exp(nucleus.radius_um.log_sd * random::normal(&mut rng)) / MADE_PIXEL_UM;
-        /// Smallest donor worth taking patches from, px.
-        const SMALLEST: f64 = 9.0;
-        let drawn = shapes.draw(radius.max(SMALLEST), &mut rng)?;
+        let radius = nucleus.radius_um.median * libm::exp(nucleus.radius_um.log_sd * random::normal(&mut rng))
+            / SYNTHETIC_PIXEL_UM;
+        /// Minimum radius of a donor, px.
+        const MIN_RADIUS: f64 = 9.0;
+        let drawn = shapes.draw(radius.max(MIN_RADIUS), &mut rng)?;
         let outline: Vec<Point> = drawn.descriptors.outline(64);
         let mut coverage = Tile::around(&outline, 1.0);
         coverage.cover(&outline);
@@ -129,9 +130,9 @@ impl FieldSource {
         Ok(Source::new(&pixels, &coverage.values, coverage.width)?)
     }
 
-    /// A field with the class's marginal and its profile from rim to centre.
+    /// Draws a field with the skewness of the class and its profile from rim to centre.
     fn texture(&self, mask: &[f32], width: usize, rng: &mut Stream) -> Vec<f32> {
-        /// Mean absorbance in units of its standard deviation inside a nucleus: what the profile is relative to.
+        /// Mean absorbance relative to its standard deviation inside a nucleus; scales the profile.
         const MEAN_OVER_SD: f64 = 4.0;
         let side = self.field.width();
         let draw = self.field.draw(rng);
@@ -147,9 +148,9 @@ impl FieldSource {
     }
 }
 
-/// A standard normal turned into a shifted log-normal of about the wanted skewness, mean 0 and variance 1.
+/// Transforms a standard normal deviate to a shifted log-normal with mean 0, variance 1 and about this skewness.
 fn skewed(normal: f64, skewness: f64) -> f64 {
-    // For small s the skewness of exp(s·n) is 3 s.
+    // For small s, the skewness of exp(s·n) is 3 s.
     let s = skewness / 3.0;
     if s.abs() < 1e-6 {
         return normal;
@@ -158,7 +159,7 @@ fn skewed(normal: f64, skewness: f64) -> f64 {
     (libm::exp(s * normal) - libm::exp(0.5 * s * s)) / (variance.sqrt() * s.signum())
 }
 
-/// Depth of every pixel below the rim, 0 at the rim to 1 at the deepest, by a two-pass chamfer distance.
+/// Returns the depth of every pixel, 0 at the rim to 1 at the deepest pixel, by a two-pass chamfer distance.
 fn depth_from_rim(mask: &[f32], width: usize) -> Vec<f64> {
     const DIAGONAL: f64 = core::f64::consts::SQRT_2;
     let height = mask.len() / width;
@@ -183,7 +184,8 @@ fn depth_from_rim(mask: &[f32], width: usize) -> Vec<f64> {
     depth.iter().map(|d| d / deepest).collect()
 }
 
-/// Linear interpolation in a profile of even steps, `at` from 0 (first step's outer edge) to 1 (last one's inner edge).
+/// Interpolates linearly in a profile of equal steps; `at` is 0 at the outer edge of the first step and 1 at the inner
+/// edge of the last.
 pub(crate) fn interpolate(profile: &[f64], at: f64) -> f64 {
     let position = (at.clamp(0.0, 1.0) * profile.len() as f64 - 0.5).clamp(0.0, (profile.len() - 1) as f64);
     let cell = random::count(position.floor()).min(profile.len() - 1);
@@ -191,7 +193,7 @@ pub(crate) fn interpolate(profile: &[f64], at: f64) -> f64 {
     profile[cell] + (position - cell as f64) * (profile[next] - profile[cell])
 }
 
-/// Shifts and scales to mean 0 and variance 1 over the pixels of a mask, zero elsewhere.
+/// Shifts and scales pixels to mean 0 and variance 1 inside a mask; pixels outside become 0.
 pub(super) fn standardise(pixels: &mut [f32], mask: &[f32]) {
     let inside = || pixels.iter().zip(mask).filter(|(_, m)| **m >= 0.5).map(|(p, _)| f64::from(*p));
     let count = inside().count().max(1) as f64;
@@ -203,9 +205,9 @@ pub(super) fn standardise(pixels: &mut [f32], mask: &[f32]) {
     }
 }
 
-/// The share of chromatin's standard deviation that is left in an image of the microscope it was measured with.
+/// Returns the fraction of the standard deviation of chromatin that remains in images of the measuring microscope.
 fn blur_attenuation(chromatin: &ChromatinStatistics) -> f64 {
-    /// Frequencies up to here, cycles per µm: far beyond what the microscope passes.
+    /// Highest frequency, cycles per µm: far beyond the cut-off of the microscope.
     const HIGHEST: f64 = 8.0;
     const STEPS: usize = 4000;
     let spectrum = Spectrum::Matern { nu: chromatin.nu, length_px: chromatin.length_um };
@@ -222,15 +224,15 @@ fn blur_attenuation(chromatin: &ChromatinStatistics) -> f64 {
     (passed / all).sqrt()
 }
 
-/// A nucleus on the grid of its donors, whose pixels may differ from the image's.
-struct Grid {
+/// A nucleus on the grid of its donors, which may have another pixel size than the image.
+struct DonorGrid {
     mask: Vec<f32>,
     width: usize,
-    /// Donor pixels to an image pixel.
+    /// Donor pixels per image pixel.
     ratio: f64,
 }
 
-impl Grid {
+impl DonorGrid {
     fn new(coverage: &Tile, ratio: f64) -> Self {
         if (ratio - 1.0).abs() < 1e-9 {
             return Self { mask: coverage.values.clone(), width: coverage.width, ratio: 1.0 };
@@ -239,7 +241,7 @@ impl Grid {
         let (width, height) = (size(coverage.width), size(coverage.height()));
         let mut mask = vec![0.0; width * height];
         for (i, value) in mask.iter_mut().enumerate() {
-            // Whatever pixel of the image may look here must find texture.
+            // All image pixels that interpolate from here need texture.
             let at = |position: usize, count: usize| random::count(position as f64 / ratio).min(count - 1);
             let (x, y) = (at(i % width, coverage.width), at(i / width, coverage.height()));
             for (nx, ny) in [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)] {
@@ -252,7 +254,7 @@ impl Grid {
         Self { mask, width, ratio }
     }
 
-    /// The texture on the image's grid, by linear interpolation, with mean 0 and variance 1 over the covered pixels.
+    /// Interpolates the texture linearly on the image grid, with mean 0 and variance 1 over the covered pixels.
     fn sample(&self, texture: &[f32], coverage: &Tile) -> Vec<f32> {
         let height = texture.len() / self.width;
         let at = |x: usize, y: usize| texture[y * self.width + x];
@@ -277,7 +279,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_skewed_normal_keeps_mean_and_variance() {
+    fn skewed_preserves_mean_and_variance() {
         let mut rng = Key { seed: 5, index: 0 }.stream("test", 0, "skew");
         let n = 40_000;
         let draws: Vec<f64> = (0..n).map(|_| skewed(random::normal(&mut rng), 0.4)).collect();
@@ -288,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn depth_grows_from_the_rim() {
+    fn depth_increases_from_the_rim() {
         let mask: Vec<f32> =
             (0..81).map(|i| if (1..8).contains(&(i % 9)) && (1..8).contains(&(i / 9)) { 1.0 } else { 0.0 }).collect();
         let depth = depth_from_rim(&mask, 9);

@@ -2,12 +2,12 @@
 
 use optics_psf::{Border, Gaussian, Method};
 
+use super::assets::ClassAssets;
+use super::cell_context::CellContext;
 use super::chromatin::standardise;
-use super::making::Cell;
+use super::parametric_shape::{perturbed_circle, placed};
 use super::piece::Piece;
-use super::studio::ClassStudio;
-use super::tile::{Point, Tile, area, grown};
-use super::wobble::{placed, wobbled_circle};
+use super::tile::{Point, Tile, area, scaled_about};
 use crate::error::Cause;
 use crate::key::Stream;
 use crate::random;
@@ -15,26 +15,27 @@ use crate::recipe::Chromatin;
 use crate::scene::NucleusBody;
 use crate::truth::part::Part;
 
-/// Points of a nucleus's outline (the paper's K = 64).
+/// Points of the outline of a nucleus (the paper's K = 64).
 const POINTS: usize = 64;
 
-/// Width of the dark rim, µm: the nuclear membrane and the chromatin that lies against it, as a microscope shows them.
+/// Width of the dark rim, µm: the nuclear membrane and adjacent chromatin, as imaged.
 const RIM_UM: f64 = 0.45;
 
-/// Absorbance of the palest chromatin relative to the nucleus: what lies above and below a gap is stained too.
+/// Minimum absorbance relative to the nucleus: chromatin above and below a gap is stained too.
 const PALEST: f32 = 0.3;
 
-/// Harmonics that wrinkle a nucleus.
+/// Harmonics of nuclear wrinkles.
 const WRINKLES: core::ops::RangeInclusive<u32> = 3..=7;
 
 /// Amplitude of the strongest wrinkles, relative to the radius.
 const WRINKLE: f64 = 0.075;
 
-/// Part of the softened edge that may be cut off.
-const EDGE_LOST: f64 = 1e-3;
+/// Fraction of the edge blur in its truncated tails.
+const EDGE_TAIL: f64 = 1e-3;
 
-pub(super) fn make(cell: &Cell<'_>, class: &ClassStudio) -> Result<Piece, Cause> {
-    let Cell { studio, scene, object, body, .. } = *cell;
+/// Draws the nucleus of a cell.
+pub(super) fn make(cell: &CellContext<'_>, class: &ClassAssets) -> Result<Piece, Cause> {
+    let CellContext { assets, scene, object, body, .. } = *cell;
     let nucleus = &body.nucleus;
     let pixel_um = scene.grid().pixel_um;
     let cell_centre = scene.grid().to_px(object.centre_um);
@@ -44,36 +45,36 @@ pub(super) fn make(cell: &Cell<'_>, class: &ClassStudio) -> Result<Piece, Cause>
     if nucleus.wrinkle > 0.0 {
         wrinkle(&mut outline, nucleus.wrinkle * WRINKLE, &mut shape_rng);
     }
-    let [dx, dy] = nucleus.off_centre.map(|share| share * body.radius_um / pixel_um);
+    let [dx, dy] = nucleus.off_centre.map(|fraction| fraction * body.radius_um / pixel_um);
     let centre = [cell_centre[0] + dx, cell_centre[1] + dy];
     let outline: Vec<Point> = outline.iter().map(|p| placed(*p, nucleus.rotation_deg.to_radians(), centre)).collect();
 
-    let edge = Gaussian::truncated(nucleus.edge_um / pixel_um, Method::Direct, EDGE_LOST)?;
+    let edge = Gaussian::truncated(nucleus.edge_um / pixel_um, Method::Direct, EDGE_TAIL)?;
     let mut coverage = Tile::around(&outline, 2.0 + edge.radius() as f64);
     coverage.cover(&outline);
     let mut inner = coverage.blank();
     let shrink = (1.0 - RIM_UM / nucleus.radius_um).max(0.0);
-    inner.cover(&grown(&outline, centre, shrink));
+    inner.cover(&scaled_about(&outline, centre, shrink));
 
     let mut rng = cell.stream("nucleus.texture");
-    let mut texture = match studio.recipe.nucleus.chromatin {
+    let mut texture = match assets.recipe.nucleus.chromatin {
         Chromatin::Quilt => {
-            let donors = studio.recipe.nucleus.donors.draw_count(&mut rng).max(1);
+            let donors = assets.recipe.nucleus.donors.draw_count(&mut rng).max(1);
             class.donors.quilt(&coverage, pixel_um, donors, &class.quilt, &mut rng)?
         }
         Chromatin::Field => class.donors.field(&coverage, pixel_um, &mut rng),
     };
-    let imaged = class.donors.imaged && studio.recipe.nucleus.chromatin == Chromatin::Quilt;
+    let imaged = class.donors.imaged && assets.recipe.nucleus.chromatin == Chromatin::Quilt;
     if nucleus.clumping > 0.0 && !imaged {
         let own = &mut cell.stream("nucleus.clumps");
         clump(&mut texture, &coverage, nucleus.clumping, pixel_um, own);
     }
     let contrast = (nucleus.texture * class.donors.sharpening) as f32;
-    // An imaged donor shows the rim of its own nucleus.
+    // The texture of an imaged donor includes its rim.
     let rim_strength = if imaged { 0.0 } else { nucleus.rim as f32 };
     let mut thickness = coverage.blank();
     if imaged {
-        // A donor has its own.
+        // The texture of an imaged donor includes its thickness.
         thickness.values.fill(1.0);
     } else {
         dome(&mut thickness, &outline, nucleus);
@@ -94,24 +95,25 @@ pub(super) fn make(cell: &Cell<'_>, class: &ClassStudio) -> Result<Piece, Cause>
     Ok(Piece { part: Part::Nucleus, imaged, ..Piece::whole(absorbance, coverage, area(&outline), nucleus.dyes) })
 }
 
-/// Makes a part of a texture's variance coarse.
-fn clump(texture: &mut [f32], coverage: &Tile, share: f64, pixel_um: f64, rng: &mut Stream) {
-    /// Standard deviation of what white noise is smoothed by, µm.
+/// Replaces a fraction of the variance of a texture by coarse noise.
+fn clump(texture: &mut [f32], coverage: &Tile, fraction: f64, pixel_um: f64, rng: &mut Stream) {
+    /// Standard deviation of the smoothing of white noise, µm.
     const CLUMP_UM: f64 = 0.7;
-    let smooth = Gaussian::new(CLUMP_UM / pixel_um).expect("pixels are at least a hundredth of a µm wide");
+    let smooth = Gaussian::new(CLUMP_UM / pixel_um).expect("pixels are at least 0.01 µm wide");
     let white: Vec<f32> = coverage.values.iter().map(|_| random::normal(rng) as f32).collect();
     let mut coarse = smooth.blur(&white, coverage.width, Border::Reflect);
     standardise(&mut coarse, &coverage.values);
-    let [fine, rough] = [1.0 - share, share].map(|part| part.sqrt() as f32);
+    let [fine, rough] = [1.0 - fraction, fraction].map(|part| part.sqrt() as f32);
     texture.iter_mut().zip(&coarse).for_each(|(value, coarse)| *value = fine * *value + rough * coarse);
 }
 
-/// Thickness of a nucleus relative to its mean: a plate of even thickness and an ellipsoid mixed, thicker towards one side.
+/// Computes the thickness of a nucleus relative to its mean: a mixture of a plate and an ellipsoid, with a linear
+/// gradient.
 fn dome(thickness: &mut Tile, outline: &[Point], nucleus: &NucleusBody) {
-    let share = nucleus.dome;
-    /// Mean over a disc of the chord √(1 − ρ²) through a ball.
+    let dome = nucleus.dome;
+    /// Mean over a disc of the chord √(1 − ρ²) of a sphere.
     const MEAN_CHORD: f64 = 2.0 / 3.0;
-    // The ellipse of the outline's second moments: those of a curve's points about a circle of radius r are r²/2.
+    // The ellipse with the second moments of the outline; the points of a circle of radius r have moments r²/2.
     let centre = fsd_shape::centroid(outline);
     let moment = |a: usize, b: usize| {
         2.0 * outline.iter().map(|p| (p[a] - centre[a]) * (p[b] - centre[b])).sum::<f64>() / outline.len() as f64
@@ -122,33 +124,34 @@ fn dome(thickness: &mut Tile, outline: &[Point], nucleus: &NucleusBody) {
         let (dx, dy) = (p[0] - centre[0], p[1] - centre[1]);
         let rho2 = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / determinant;
         let chord = (1.0 - rho2).max(0.0).sqrt() / MEAN_CHORD;
-        let slant = (dx * nucleus.wedge[0] + dy * nucleus.wedge[1]) / determinant.sqrt().sqrt();
-        *value = ((1.0 - share + share * chord) * (1.0 + slant).max(0.0)) as f32;
+        let slant =
+            (dx * nucleus.thickness_gradient[0] + dy * nucleus.thickness_gradient[1]) / determinant.sqrt().sqrt();
+        *value = ((1.0 - dome + dome * chord) * (1.0 + slant).max(0.0)) as f32;
     });
 }
 
-/// Radius of a nucleolus, µm: from, to.
+/// Radius of a nucleolus, µm: minimum, maximum.
 const NUCLEOLUS_UM: [f64; 2] = [0.5, 1.1];
 
-/// Its absorbance relative to the nucleus's.
+/// Absorbance of a nucleolus relative to the nucleus.
 const NUCLEOLUS: f64 = 0.8;
 
-/// A round, even, dark body inside a nucleus.
-fn add_nucleolus(absorbance: &mut Tile, outline: &[Point], centre: Point, cell: &Cell<'_>, rng: &mut Stream) {
+/// Adds a nucleolus: a round, dark body of uniform absorbance.
+fn add_nucleolus(absorbance: &mut Tile, outline: &[Point], centre: Point, cell: &CellContext<'_>, rng: &mut Stream) {
     let (strength, pixel_um) = (cell.body.nucleus.absorbance, cell.scene.grid().pixel_um);
     let radius = random::between(NUCLEOLUS_UM[0], NUCLEOLUS_UM[1], rng) / pixel_um;
     let rim = outline[random::below(outline.len(), rng)];
-    let share = random::between(0.0, 0.6, rng);
-    let at = [centre[0] + share * (rim[0] - centre[0]), centre[1] + share * (rim[1] - centre[1])];
+    let t = random::between(0.0, 0.6, rng);
+    let at = [centre[0] + t * (rim[0] - centre[0]), centre[1] + t * (rim[1] - centre[1])];
     let mut cover = absorbance.blank();
-    let round = wobbled_circle(radius, 0.08, 0.08, rng);
+    let round = perturbed_circle(radius, 0.08, 0.08, rng);
     cover.cover(&round.iter().map(|p| [p[0] + at[0], p[1] + at[1]]).collect::<Vec<_>>());
     for (value, cover) in absorbance.values.iter_mut().zip(&cover.values) {
         *value += cover * (NUCLEOLUS * strength) as f32;
     }
 }
 
-/// Pushes the points of an outline in and out by a few harmonics of random phase, with corners where they meet.
+/// Displaces the points of an outline radially by harmonics of random phase, with notches of sharp corners.
 fn wrinkle(outline: &mut [Point], strength: f64, rng: &mut Stream) {
     let radius = (area(outline) / core::f64::consts::PI).sqrt();
     let waves: Vec<[f64; 3]> = WRINKLES
@@ -160,7 +163,7 @@ fn wrinkle(outline: &mut [Point], strength: f64, rng: &mut Stream) {
     for point in outline.iter_mut() {
         let angle = libm::atan2(point[1], point[0]);
         let length = (point[0] * point[0] + point[1] * point[1]).sqrt();
-        // The absolute value gives notches a corner and leaves bulges round, as a wrinkled membrane has them.
+        // The absolute value gives sharp notches and round bulges, as in a wrinkled membrane.
         let push: f64 =
             waves.iter().map(|[h, a, phase]| -a.abs() * (libm::cos(h * angle + phase)).abs() + 0.6 * a.abs()).sum();
         let scale = ((length + push) / length.max(1e-9)).clamp(0.5, 1.5);

@@ -1,4 +1,4 @@
-//! Small images at a place of the large one, and exact coverage of polygons.
+//! Tiles, small images at a position in a larger image, and exact coverage of polygons.
 
 use core::ops::Range;
 use std::borrow::Cow;
@@ -6,10 +6,10 @@ use std::borrow::Cow;
 use ab_glyph_rasterizer::{Rasterizer, point};
 use multiversion::multiversion;
 
-/// A point in pixels: x right, y down, pixel centres at whole numbers.
+/// A point in pixels: x right, y down, pixel centres at integers.
 pub(crate) type Point = [f64; 2];
 
-/// A small image whose upper left pixel is pixel `origin` of the large one.
+/// A small image whose upper left pixel is pixel `origin` of a larger image.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Tile {
     pub(crate) origin: [i64; 2],
@@ -18,7 +18,7 @@ pub(crate) struct Tile {
 }
 
 impl Tile {
-    /// A tile of zeros that holds all these points and `margin` pixels round them.
+    /// Returns a tile of zeros around points, with a margin in pixels.
     pub(crate) fn around<'a>(points: impl IntoIterator<Item = &'a Point>, margin: f64) -> Self {
         let mut low = [f64::INFINITY; 2];
         let mut high = [f64::NEG_INFINITY; 2];
@@ -37,10 +37,10 @@ impl Tile {
         Self { origin: [x, y], width, values: vec![0.0; width * height] }
     }
 
-    /// The part of it within a square about a point, `reach` pixels to each side.
-    pub(crate) fn within(self, centre: Point, reach: f64) -> Self {
-        let low = centre.map(|at| (at - reach).floor() as i64);
-        let high = centre.map(|at| (at + reach).ceil() as i64 + 1);
+    /// Crops the tile to a square around a point with half width `radius`.
+    pub(crate) fn cropped(self, centre: Point, radius: f64) -> Self {
+        let low = centre.map(|at| (at - radius).floor() as i64);
+        let high = centre.map(|at| (at + radius).ceil() as i64 + 1);
         let end = [self.origin[0] + self.width as i64, self.origin[1] + self.height() as i64];
         if (0..2).all(|axis| self.origin[axis] >= low[axis] && end[axis] <= high[axis]) {
             return self;
@@ -49,16 +49,16 @@ impl Tile {
         let length = |axis: usize| usize::try_from(end[axis].min(high[axis]) - origin[axis]).unwrap_or(0).max(1);
         let (width, height) = (length(0), length(1));
         let mut part = Self { origin, width, values: vec![0.0; width * height] };
-        lay(&mut part.values, width, origin, &self, |row, values| row.copy_from_slice(values));
+        overlay(&mut part.values, width, origin, &self, |row, values| row.copy_from_slice(values));
         part
     }
 
-    /// A tile of zeros of the same size at the same place.
+    /// Returns a tile of zeros of the same size and position.
     pub(crate) fn blank(&self) -> Self {
         Self { origin: self.origin, width: self.width, values: vec![0.0; self.values.len()] }
     }
 
-    /// The tile on a grid of pixels `n` times as wide: each the mean of what lies in it.
+    /// Returns the tile on a grid of pixels `n` times as large: each is the mean of the pixels in it.
     pub(crate) fn coarsened(&self, n: usize) -> Self {
         let side = n as i64;
         let origin = self.origin.map(|at| at.div_euclid(side));
@@ -72,52 +72,52 @@ impl Tile {
         let at = |axis: usize, place: usize| {
             usize::try_from((self.origin[axis] + place as i64).div_euclid(side) - origin[axis]).unwrap_or(0)
         };
-        // Pixels of the first coarse one, which may begin before the tile.
+        // Number of pixels in the first coarse pixel, which may begin before the tile.
         let first = (n - usize::try_from(self.origin[0].rem_euclid(side)).unwrap_or(0)).min(self.width);
         for (y, row) in self.values.chunks_exact(self.width).enumerate() {
             let (left, rest) = row.split_at(first);
             let [head, coarse @ ..] = &mut values[at(1, y) * width..][..width] else { continue };
             left.iter().for_each(|value| *head += weight * value);
             match n {
-                2 => gather::<2>(coarse, rest, weight),
-                3 => gather::<3>(coarse, rest, weight),
-                4 => gather::<4>(coarse, rest, weight),
+                2 => sum_groups::<2>(coarse, rest, weight),
+                3 => sum_groups::<3>(coarse, rest, weight),
+                4 => sum_groups::<4>(coarse, rest, weight),
                 _ => coarse.iter_mut().zip(rest.chunks(n)).for_each(|(coarse, fine)| add_to(coarse, fine, weight)),
             }
         }
         Self { origin, width, values }
     }
 
-    /// The sum of all values.
+    /// Returns the sum of all values.
     pub(crate) fn sum(&self) -> f64 {
         sum_where(&self.values, &self.values, f32::NEG_INFINITY)
     }
 
-    /// The sum of its values where another tile's, whose pixels are `step` times as wide, are at least so high.
-    pub(crate) fn sum_where(&self, other: &Self, step: usize, least: f32) -> f64 {
+    /// Returns the sum of its values where `other` is at least `min`. Pixels of `other` are `step` times as large.
+    pub(crate) fn sum_where(&self, other: &Self, step: usize, min: f32) -> f64 {
         let start = other.origin.map(|at| at * step as i64);
-        let (columns, others) = shared(self.origin[0], self.width, start[0], other.width * step);
-        let (rows, other_rows) = shared(self.origin[1], self.height(), start[1], other.height() * step);
+        let (columns, others) = intersection(self.origin[0], self.width, start[0], other.width * step);
+        let (rows, other_rows) = intersection(self.origin[1], self.height(), start[1], other.height() * step);
         if columns.is_empty() {
             return 0.0;
         }
-        // Pixels of the other tile that the columns begin and end in.
-        let wide = others.start / step..others.end.div_ceil(step);
-        let mut line = vec![0.0; wide.len() * step];
-        let mut known = None;
+        // Pixel range of the other tile.
+        let coarse = others.start / step..others.end.div_ceil(step);
+        let mut line = vec![0.0; coarse.len() * step];
+        let mut current_row = None;
         let mut sum = 0.0;
         for (y, other_y) in rows.zip(other_rows) {
             let row = other_y / step;
-            if known.replace(row) != Some(row) {
-                repeat_each(&mut line, &other.values[row * other.width..][wide.clone()], step);
+            if current_row.replace(row) != Some(row) {
+                repeat_each(&mut line, &other.values[row * other.width..][coarse.clone()], step);
             }
             let values = &self.values[y * self.width..][columns.clone()];
-            sum += sum_where(values, &line[others.start - wide.start * step..], least);
+            sum += sum_where(values, &line[others.start - coarse.start * step..], min);
         }
         sum
     }
 
-    /// The tile on a grid `n` times as fine, each pixel repeated.
+    /// Returns the tile on a grid `n` times as fine, with each pixel repeated.
     pub(crate) fn repeated(self, n: usize) -> Self {
         if n == 1 {
             return self;
@@ -132,7 +132,7 @@ impl Tile {
         Self { origin: self.origin.map(|at| at * n as i64), width, values }
     }
 
-    /// The tile on a grid `n` times as fine, by cubics through its pixels (Catmull and Rom), none below 0. Nothing lies beyond it.
+    /// Returns the tile on a grid `n` times as fine, by Catmull–Rom interpolation clipped at 0. Pixels outside are 0.
     pub(crate) fn refined(self, n: usize) -> Self {
         match n {
             1 => self,
@@ -144,20 +144,20 @@ impl Tile {
 
     fn refined_by<const N: usize>(self) -> Self {
         let (width, height) = (self.width, self.height());
-        let taps: [Taps; N] = core::array::from_fn(|k| Taps::new((k as f64 + 0.5) / N as f64 - 0.5));
+        let kernels: [CubicWeights; N] = core::array::from_fn(|k| CubicWeights::new((k as f64 + 0.5) / N as f64 - 0.5));
         let mut values = vec![0.0; self.values.len() * N * N];
-        // Room for the taps on both sides.
-        let mut line = vec![0.0; width + 2 * REACH];
-        let nothing = vec![0.0; width];
+        // One row with margins for the interpolation.
+        let mut line = vec![0.0; width + 2 * RADIUS];
+        let zeros = vec![0.0; width];
         let row = |y: usize| {
-            let y = y.checked_sub(REACH).filter(|y| *y < height);
-            y.map_or(&nothing[..], |y| &self.values[y * width..(y + 1) * width])
+            let y = y.checked_sub(RADIUS).filter(|y| *y < height);
+            y.map_or(&zeros[..], |y| &self.values[y * width..(y + 1) * width])
         };
         for (y, rows) in values.chunks_exact_mut(N * N * width).enumerate() {
-            for (out, Taps { first, weights }) in rows.chunks_exact_mut(N * width).zip(&taps) {
-                let four = core::array::from_fn(|tap| row(y + first + tap));
-                mix(&mut line[REACH..REACH + width], four, *weights);
-                spread(out, &line, &taps);
+            for (out, CubicWeights { first, weights }) in rows.chunks_exact_mut(N * width).zip(&kernels) {
+                let four = core::array::from_fn(|k| row(y + first + k));
+                mix(&mut line[RADIUS..RADIUS + width], four, *weights);
+                refine_row(out, &line, &kernels);
             }
         }
         Self { origin: self.origin.map(|at| at * N as i64), width: width * N, values }
@@ -167,7 +167,7 @@ impl Tile {
         self.values.len() / self.width
     }
 
-    /// Applies a function of position to every pixel.
+    /// Calls a function with the position and value of every pixel.
     pub(crate) fn for_each(&mut self, mut visit: impl FnMut(Point, &mut f32)) {
         let (width, [x0, y0]) = (self.width, self.origin);
         for (y, row) in (y0..).zip(self.values.chunks_exact_mut(width)) {
@@ -177,31 +177,30 @@ impl Tile {
         }
     }
 
-    /// Raises every pixel to the share of its area that a simple polygon covers, if that is more. What lies beyond the tile is
-    /// left out.
+    /// Raises every pixel to the fraction of its area inside a simple polygon. Parts outside the tile are ignored.
     pub(crate) fn cover(&mut self, polygon: &[Point]) {
         let mut rasterizer = Rasterizer::new(self.width, self.height());
         self.draw(&mut rasterizer, polygon);
         let values = &mut self.values;
-        rasterizer.for_each_pixel(|index, share| values[index] = values[index].max(share.min(1.0)));
+        rasterizer.for_each_pixel(|index, fraction| values[index] = values[index].max(fraction.min(1.0)));
     }
 
-    /// Adds so much of the share of each pixel that simple polygons cover, all of which run the same way round, polygon by polygon.
+    /// Adds `weight` times the coverage of simple polygons, which must have the same orientation.
     pub(crate) fn add_covers(&mut self, polygons: impl IntoIterator<Item = Vec<Point>>, weight: f32) {
         let mut rasterizer = Rasterizer::new(self.width, self.height());
         for polygon in polygons {
             self.draw(&mut rasterizer, &polygon);
         }
-        // Areas have signs, so that those of all add up.
+        // The rasteriser adds signed areas, so one pass sums all polygons.
         let values = &mut self.values;
-        rasterizer.for_each_pixel(|index, share| values[index] += weight * share);
+        rasterizer.for_each_pixel(|index, fraction| values[index] += weight * fraction);
     }
 
     fn draw(&self, rasterizer: &mut Rasterizer, polygon: &[Point]) {
         let low = self.origin.map(|at| at as f64 - 0.5);
         let high = [low[0] + self.width as f64, low[1] + self.height() as f64];
         let polygon = &*clipped(polygon, low, high);
-        // Pixel (0, 0) of the rasteriser is the unit square whose corner, not centre, is at zero.
+        // Pixel (0, 0) of the rasteriser has its corner, not its centre, at the origin.
         let shift = |p: Point| {
             let x = p[0] - self.origin[0] as f64 + 0.5;
             let y = p[1] - self.origin[1] as f64 + 0.5;
@@ -213,24 +212,24 @@ impl Tile {
         }
     }
 
-    /// Gives every stretch of this tile that another one meets, with what of the other lies there.
-    pub(crate) fn meet(&mut self, other: &Self, blend: impl FnMut(&mut [f32], &[f32])) {
-        lay(&mut self.values, self.width, self.origin, other, blend);
+    /// Calls `blend` with each row segment shared with another tile: the values of this tile and of the other.
+    pub(crate) fn blend(&mut self, other: &Self, blend: impl FnMut(&mut [f32], &[f32])) {
+        overlay(&mut self.values, self.width, self.origin, other, blend);
     }
 }
 
-/// How far from a pixel its taps may begin or end.
-const REACH: usize = 2;
+/// Radius of the interpolation kernel, px.
+const RADIUS: usize = 2;
 
-/// Four neighbours of a pixel and their weights.
-struct Taps {
-    /// The first of them, counted from [`REACH`] before the pixel.
+/// Weights of the four neighbours of a position in cubic interpolation.
+struct CubicWeights {
+    /// Index of the first neighbour, relative to [`RADIUS`] before the pixel.
     first: usize,
     weights: [f32; 4],
 }
 
-impl Taps {
-    /// For a place so far from a pixel's middle, −½ to ½.
+impl CubicWeights {
+    /// Computes the weights for an offset from the pixel centre, −½ to ½.
     fn new(offset: f64) -> Self {
         let t = offset - offset.floor();
         let cubic = [
@@ -250,15 +249,15 @@ fn mix(out: &mut [f32], [a, b, c, d]: [&[f32]; 4], weights: [f32; 4]) {
     }
 }
 
-/// From a row with [`REACH`] more at both ends to one `N` times as fine.
+/// Interpolates a row with margins of [`RADIUS`] to a grid `N` times as fine.
 #[multiversion(targets = "simd")]
-fn spread<const N: usize>(out: &mut [f32], line: &[f32], taps: &[Taps; N]) {
-    // With a weight of 0 at one end all places take the same values, and become vectors.
-    let mut weights = [[0.0; 2 * REACH + 1]; N];
-    for (weights, Taps { first, weights: four }) in weights.iter_mut().zip(taps) {
+fn refine_row<const N: usize>(out: &mut [f32], line: &[f32], kernels: &[CubicWeights; N]) {
+    // Padding with a weight of 0 gives all positions the same inputs, which allows vectorisation.
+    let mut weights = [[0.0; 2 * RADIUS + 1]; N];
+    for (weights, CubicWeights { first, weights: four }) in weights.iter_mut().zip(kernels) {
         weights[*first..first + 4].copy_from_slice(four);
     }
-    for (out, near) in out.as_chunks_mut::<N>().0.iter_mut().zip(line.windows(2 * REACH + 1)) {
+    for (out, near) in out.as_chunks_mut::<N>().0.iter_mut().zip(line.windows(2 * RADIUS + 1)) {
         for (out, w) in out.iter_mut().zip(&weights) {
             let value = w[0] * near[0] + w[1] * near[1] + w[2] * near[2] + w[3] * near[3] + w[4] * near[4];
             *out = if value > 0.0 { value } else { 0.0 };
@@ -266,9 +265,9 @@ fn spread<const N: usize>(out: &mut [f32], line: &[f32], taps: &[Taps; N]) {
     }
 }
 
-/// Adds so much of every `N` values of a row to the one pixel that they lie in; the last may have fewer.
+/// Adds `weight` times every group of `N` values of a row to one coarse pixel; the last group may be shorter.
 #[multiversion(targets = "simd")]
-fn gather<const N: usize>(coarse: &mut [f32], row: &[f32], weight: f32) {
+fn sum_groups<const N: usize>(coarse: &mut [f32], row: &[f32], weight: f32) {
     let (whole, rest) = row.as_chunks::<N>();
     for (coarse, fine) in coarse.iter_mut().zip(whole) {
         add_to(coarse, fine, weight);
@@ -283,7 +282,7 @@ fn add_to(coarse: &mut f32, fine: &[f32], weight: f32) {
     fine.iter().for_each(|value| *coarse += weight * value);
 }
 
-/// Each value of a row `n` times.
+/// Repeats each value of a row `n` times.
 fn repeat_each(fine: &mut [f32], row: &[f32], n: usize) {
     match n {
         1 => fine.copy_from_slice(row),
@@ -297,24 +296,24 @@ fn repeat<const N: usize>(fine: &mut [f32], row: &[f32]) {
     fine.as_chunks_mut::<N>().0.iter_mut().zip(row).for_each(|(fine, value)| *fine = [*value; N]);
 }
 
-/// The sum of values beside others that are at least so high: in sixteen partial sums, so that none has to wait for itself.
+/// Returns the sum of the values whose counterparts are at least `min`, in 16 independent partial sums.
 #[multiversion(targets = "simd")]
-fn sum_where(values: &[f32], others: &[f32], least: f32) -> f64 {
+fn sum_where(values: &[f32], others: &[f32], min: f32) -> f64 {
     const PARTS: usize = 16;
     let mut parts = [0.0_f64; PARTS];
-    let kept = |value: f32, other: f32| f64::from(if other >= least { value } else { 0.0 });
+    let selected = |value: f32, other: f32| f64::from(if other >= min { value } else { 0.0 });
     let others = &others[..values.len()];
     let ((values, last), (others, others_last)) = (values.as_chunks::<PARTS>(), others.as_chunks::<PARTS>());
     for (values, others) in values.iter().zip(others) {
         for l in 0..PARTS {
-            parts[l] += kept(values[l], others[l]);
+            parts[l] += selected(values[l], others[l]);
         }
     }
-    let rest: f64 = last.iter().zip(others_last).map(|(value, other)| kept(*value, *other)).sum();
+    let rest: f64 = last.iter().zip(others_last).map(|(value, other)| selected(*value, *other)).sum();
     parts.iter().sum::<f64>() + rest
 }
 
-/// The part of a polygon that lies in a rectangle, cut side by side (Sutherland and Hodgman, doi:10.1145/360767.360802).
+/// Clips a polygon to a rectangle (Sutherland and Hodgman, doi:10.1145/360767.360802).
 fn clipped(polygon: &[Point], low: Point, high: Point) -> Cow<'_, [Point]> {
     let inside = |p: &Point| (0..2).all(|axis| (low[axis]..=high[axis]).contains(&p[axis]));
     if polygon.iter().all(inside) {
@@ -338,7 +337,7 @@ fn clipped(polygon: &[Point], low: Point, high: Point) -> Cow<'_, [Point]> {
             }
         }
     }
-    // Where two cuts meet in a corner, rounding may leave a point a hair outside.
+    // Rounding at a corner may leave a point slightly outside.
     for point in &mut left {
         for axis in 0..2 {
             point[axis] = point[axis].clamp(low[axis], high[axis]);
@@ -347,41 +346,42 @@ fn clipped(polygon: &[Point], low: Point, high: Point) -> Cow<'_, [Point]> {
     Cow::Owned(left)
 }
 
-/// Lays the rows of a tile over those of an image that is `width` wide and whose first pixel is pixel `origin`, as far as they
-/// meet: `blend` gets a stretch of the image and what of the tile lies over it.
+/// Calls `blend` with each row segment that an image and a tile share: the values of the image and of the tile.
+///
+/// The image has `width` columns and its first pixel is pixel `origin`.
 #[inline(always)]
-pub(crate) fn lay(
+pub(crate) fn overlay(
     image: &mut [f32],
     width: usize,
     origin: [i64; 2],
     tile: &Tile,
     mut blend: impl FnMut(&mut [f32], &[f32]),
 ) {
-    let (columns, own) = shared(origin[0], width, tile.origin[0], tile.width);
+    let (columns, own) = intersection(origin[0], width, tile.origin[0], tile.width);
     if columns.is_empty() {
         return;
     }
-    let (rows, own_rows) = shared(origin[1], image.len() / width, tile.origin[1], tile.height());
+    let (rows, own_rows) = intersection(origin[1], image.len() / width, tile.origin[1], tile.height());
     let rows = image.chunks_exact_mut(width).skip(rows.start);
     for (row, values) in rows.zip(tile.values.chunks_exact(tile.width).skip(own_rows.start)) {
         blend(&mut row[columns.clone()], &values[own.clone()]);
     }
 }
 
-/// What two stretches of pixels, told by their first pixels and lengths, have in common: as each counts it.
-fn shared(first: i64, length: usize, other: i64, other_length: usize) -> (Range<usize>, Range<usize>) {
+/// Returns the intersection of two pixel ranges, given by first pixel and length, as index ranges into each.
+fn intersection(first: i64, length: usize, other: i64, other_length: usize) -> (Range<usize>, Range<usize>) {
     let low = first.max(other);
     let high = (first + length as i64).min(other + other_length as i64).max(low);
     let from = |first: i64| (low - first) as usize..(high - first) as usize;
     (from(first), from(other))
 }
 
-/// A polygon as many times as large about a point.
-pub(crate) fn grown(polygon: &[Point], about: Point, times: f64) -> Vec<Point> {
-    polygon.iter().map(|p| [about[0] + times * (p[0] - about[0]), about[1] + times * (p[1] - about[1])]).collect()
+/// Scales a polygon about a point.
+pub(crate) fn scaled_about(polygon: &[Point], about: Point, factor: f64) -> Vec<Point> {
+    polygon.iter().map(|p| [about[0] + factor * (p[0] - about[0]), about[1] + factor * (p[1] - about[1])]).collect()
 }
 
-/// Area of a simple polygon, pixels².
+/// Returns the area of a simple polygon, px².
 pub(crate) fn area(polygon: &[Point]) -> f64 {
     fsd_shape::signed_area(polygon).abs()
 }
@@ -403,7 +403,7 @@ pub(super) mod tests {
         Tile { origin, width, values: (0..width * height).map(|i| ((i * 37) % 101) as f32 / 101.0).collect() }
     }
 
-    /// The value of a tile at a pixel of the large image.
+    /// Returns the value of a tile at a pixel of the larger image.
     pub(in crate::phantom) fn at(tile: &Tile, [x, y]: [i64; 2]) -> f32 {
         let place = usize::try_from(x - tile.origin[0]).ok().zip(usize::try_from(y - tile.origin[1]).ok());
         let place = place.filter(|(x, y)| *x < tile.width && *y < tile.height());
@@ -411,7 +411,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn sums_are_taken_where_tiles_meet_and_the_other_is_high() {
+    fn sum_where_adds_values_where_the_other_tile_reaches_the_minimum() {
         let mut own = tile([3, -2], 40, 17);
         for (origin, step) in [
             ([3, -2], 1),
@@ -425,10 +425,10 @@ pub(super) mod tests {
             ([3, 30], 1),
         ] {
             let other = tile(origin, 25, 21);
-            let wide = other.clone().repeated(step);
+            let repeated = other.clone().repeated(step);
             let mut slow = 0.0;
             own.for_each(|p, value| {
-                slow += if at(&wide, p.map(|c| c as i64)) >= 0.5 { f64::from(*value) } else { 0.0 };
+                slow += if at(&repeated, p.map(|c| c as i64)) >= 0.5 { f64::from(*value) } else { 0.0 };
             });
             let found = own.sum_where(&other, step, 0.5);
             assert!((found - slow).abs() < 1e-9 * slow.max(1.0), "{origin:?} {step}: {found} {slow}");
@@ -436,7 +436,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn coverage_is_exact_area_and_covering_twice_adds_nothing() {
+    fn coverage_equals_the_area_and_covering_twice_changes_nothing() {
         let polygon = disc([-3.3, 17.8], 6.4);
         let mut tile = Tile::around(&polygon, 2.0);
         tile.cover(&polygon);
@@ -447,15 +447,15 @@ pub(super) mod tests {
             x += p[0] * f64::from(*v);
             y += p[1] * f64::from(*v);
         });
-        // A pixel covered in part counts at its centre: right to a hundredth, where a shifted grid would be off by a half.
-        assert!((x / sum + 3.3).abs() < 1e-2 && (y / sum - 17.8).abs() < 1e-2, "pixel centres at whole numbers");
+        // Partly covered pixels count at their centres: accurate to 0.01 px, while a shifted grid would err by 0.5 px.
+        assert!((x / sum + 3.3).abs() < 1e-2 && (y / sum - 17.8).abs() < 1e-2, "pixel centres are at integers");
         let once = tile.clone();
         tile.cover(&polygon);
         assert_eq!(once, tile);
     }
 
     #[test]
-    fn sums_and_coarser_pixels_hold_everything() {
+    fn sum_and_coarsened_preserve_the_total() {
         for (origin, width, height) in [([0, 0], 7, 30), ([-21, 3], 60, 5), ([2, -9], 3, 41), ([1, 1], 1, 1)] {
             let tile = tile(origin, width, height);
             let sum: f64 = tile.values.iter().map(|v| f64::from(*v)).sum();
@@ -466,8 +466,8 @@ pub(super) mod tests {
                 coarse.for_each(|p, value| {
                     let corner = p.map(|at| at as i64 * side);
                     let places = (0..side * side).map(|i| [corner[0] + i % side, corner[1] + i / side]);
-                    let wanted = places.map(|p| at(&tile, p)).sum::<f32>() / (n * n) as f32;
-                    assert!((*value - wanted).abs() < 1e-5, "{origin:?} {n}");
+                    let expected = places.map(|p| at(&tile, p)).sum::<f32>() / (n * n) as f32;
+                    assert!((*value - expected).abs() < 1e-5, "{origin:?} {n}");
                 });
                 assert!((coarse.sum() * (n * n) as f64 - sum).abs() < 1e-4, "{n}");
             }
@@ -475,23 +475,23 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn finer_pixels_follow_a_quadratic_and_hold_the_same() {
+    fn refined_reproduces_a_quadratic_and_preserves_the_total() {
         for n in 1..=4 {
-            // Cubics through pixels reproduce quadratics where no tap leaves the tile.
+            // Cubic interpolation reproduces quadratics away from the border of the tile.
             let shape = |x: f64, y: f64| 5.0 + 0.3 * x - 0.2 * y + 0.02 * x * x - 0.01 * x * y;
             let mut tile = Tile { origin: [-4, 3], width: 12, values: vec![0.0; 12 * 10] };
             tile.for_each(|p, value| *value = shape(p[0], p[1]) as f32);
             let mut fine = tile.clone().refined(n);
             assert_eq!((fine.width, fine.height(), fine.origin), (12 * n, 10 * n, [-4 * n as i64, 3 * n as i64]));
-            let middle = |at: f64| (at + 0.5) / n as f64 - 0.5;
+            let coarse = |at: f64| (at + 0.5) / n as f64 - 0.5;
             fine.for_each(|p, value| {
-                let [x, y] = p.map(middle);
+                let [x, y] = p.map(coarse);
                 let inside = (-2.0..=5.0).contains(&x) && (5.0..=10.0).contains(&y);
                 assert!(!inside || (f64::from(*value) - shape(x, y)).abs() < 1e-4, "{n}: {x} {y} {value}");
             });
             let repeated = tile.clone().repeated(n).coarsened(n);
             assert!(repeated.values.iter().zip(&tile.values).all(|(a, b)| (a - b).abs() < 1e-5));
-            // What ends within the tile is hardly more on the finer grid, where its undershoot is cut off.
+            // Clipping the undershoot at 0 changes the total of a disc inside the tile by less than 2 %.
             let mut blob = tile.blank();
             blob.cover(&disc([1.2, 7.6], 2.7));
             let (sum, area) = (blob.sum(), blob.refined(n).sum() / (n * n) as f64);
@@ -500,7 +500,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn what_lies_beyond_a_tile_is_left_out() {
+    fn parts_outside_a_tile_are_ignored() {
         let polygon = disc([4.0, 6.0], 9.0);
         let mut whole = Tile::around(&polygon, 2.0);
         whole.cover(&polygon);
@@ -517,13 +517,13 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn laying_clips_at_every_side() {
+    fn blend_clips_at_every_side() {
         for (x, y, width, height) in
             [(-2, -3, 9, 8), (3, 2, 2, 2), (5, 4, 9, 9), (-4, 1, 4, 2), (0, 6, 3, 3), (8, 0, 2, 2), (-9, -9, 40, 40)]
         {
             let other = tile([x, y], width, height);
             let mut image = Tile { origin: [-1, 2], width: 8, values: vec![0.5; 48] };
-            image.meet(&other, |row, values| row.iter_mut().zip(values).for_each(|(pixel, value)| *pixel += value));
+            image.blend(&other, |row, values| row.iter_mut().zip(values).for_each(|(pixel, value)| *pixel += value));
             image.for_each(|p, pixel| assert_eq!(*pixel, 0.5 + at(&other, p.map(|c| c as i64)), "{x} {y} {p:?}"));
         }
     }

@@ -30,12 +30,15 @@ section! {
 section! {
     /// How much of the colour JPEG leaves out.
     pub enum Subsampling {
-        /// None: 4:4:4.
-        Full,
-        /// Every second column: 4:2:2.
-        Columns,
-        /// Every second column and row: 4:2:0.
-        Squares,
+        /// All colour is kept.
+        #[serde(rename = "4:4:4")]
+        S444,
+        /// Every second column of colour is kept.
+        #[serde(rename = "4:2:2")]
+        S422,
+        /// Every second column and row of colour is kept.
+        #[serde(rename = "4:2:0")]
+        S420,
     }
 }
 
@@ -57,7 +60,7 @@ section! {
         offset_dn: Number = 0.0, 0..=4096;
         /// Glare that was taken off the picture as its black level, as a share of the light of the empty slide: what is
         /// dark keeps the noise of the glare.
-        glare_removed: Number = 0.0, 0..=0.8;
+        glare_subtracted: Number = 0.0, 0..=0.8;
         /// How photons are counted.
         photon_noise: PhotonNoise = PhotonNoise::Exact;
         /// Photo response non-uniformity: spread of the pixels' responses as a share of their mean.
@@ -87,7 +90,7 @@ section! {
         /// Quality of a JPEG through which the picture has gone, or 0 for none; 8 bits only.
         jpeg_quality: Count = 0, 0..=100;
         /// How much of the colour that leaves out.
-        jpeg_subsampling: Subsampling = Subsampling::Squares;
+        jpeg_subsampling: Subsampling = Subsampling::S420;
     }
 }
 
@@ -150,7 +153,7 @@ impl Camera {
             read_noise_e: number(read_noise_e),
             read_noise_rms_e: number(read_noise_rms_e),
             offset_dn: number(params.offset_dn),
-            glare_removed: 0.0.into(),
+            glare_subtracted: 0.0.into(),
             photon_noise: match params.photon_noise {
                 ccd_noise::PhotonNoise::Exact => PhotonNoise::Exact,
                 ccd_noise::PhotonNoise::NormalAbove { .. } => PhotonNoise::Normal,

@@ -1,7 +1,7 @@
 //! What a recipe must fulfil before anything is drawn from it: each number its range, and numbers what relates them.
 
 use super::camera::Camera;
-use super::imaging::{Imaging, Light, Optics, Picture};
+use super::imaging::{FocusOutput, Imaging, Light, Optics};
 use super::number::Number;
 use super::section::Declared;
 use super::whole::{RECIPE_VERSION, Recipe};
@@ -77,10 +77,10 @@ fn field(recipe: &Recipe, check: &mut Check<'_>) {
         check.add("field.width_px", message);
     }
     let exact = matches!(&recipe.optics, Optics::BrightField(microscope) if microscope.imaging == Imaging::Abbe);
-    if focus.picture == Picture::Extended && exact {
-        let message = "\"extended\" fuses planes object by object; expected `optics.imaging` = \"product\" with it, \
+    if focus.output == FocusOutput::Edf && exact {
+        let message = "\"edf\" fuses planes object by object; expected `optics.imaging` = \"product\" with it, \
                        or \"planes\"";
-        check.add("focus.picture", message.to_owned());
+        check.add("focus.output", message.to_owned());
     }
 }
 
@@ -108,13 +108,13 @@ fn magnified(recipe: &Recipe, check: &mut Check<'_>) {
 /// Eq. 10 takes the logarithm of H − c·I_pe, which must stay above zero.
 fn background(recipe: &Recipe, check: &mut Check<'_>) {
     let background = &recipe.background;
-    let ([level, _], [_, scatter]) = (background.level.bounds(), background.scatter.bounds());
-    if scatter >= level {
+    let ([level, _], [_, texture]) = (background.level.bounds(), background.texture.bounds());
+    if texture >= level {
         let message = format!(
             "{} takes more light than `background.level` = {} leaves; expected less than {level}",
-            background.scatter, background.level
+            background.texture, background.level
         );
-        check.add("background.scatter", message);
+        check.add("background.texture", message);
     }
 }
 
@@ -206,7 +206,7 @@ mod tests {
         let gaussians = Gaussians { sigma_xy_um: Number::Fixed(f64::NAN), ..Gaussians::default() };
         recipe.optics = Optics::Gaussian(gaussians);
         recipe.field.width_px = Number::Fixed(-3.0);
-        recipe.background.scatter = Number::Fixed(0.95);
+        recipe.background.texture = Number::Fixed(0.95);
         recipe.nucleus.overlap_um = Number::Fixed(1.5);
         let text: Vec<String> = recipe.problems().iter().map(ToString::to_string).collect();
         assert_eq!(text.len(), 5, "{text:?}");
@@ -221,7 +221,7 @@ mod tests {
         recipe.camera.bits = Number::Fixed(8.5);
         recipe.field.width_px =
             Number::Drawn { law: Law::Choice(vec![100.0, 100.5]), min: f64::NEG_INFINITY, max: f64::INFINITY };
-        recipe.debris.speckles.count = Number::uniform(0.5, 2.5);
+        recipe.debris.speckles.count = Number::uniform(0.5, 2.5).into();
         let text: Vec<String> = recipe.problems().iter().map(ToString::to_string).collect();
         assert_eq!(text, ["field.width_px: 100.5 is not a whole number", "camera.bits: 8.5 is not a whole number"]);
     }

@@ -4,7 +4,8 @@ use super::number::{Count, Number};
 use super::section::section;
 
 section! {
-    /// The image: its size and the size of its pixels. Counts of cells and debris are those of a whole field, whatever its size.
+    /// The image: its size and the size of its pixels. Densities of cells and debris apply to its
+    /// area; objects of a density also lie in a margin of 60 µm round it, from which they reach into the image.
     pub struct Field {
         /// Width; drawn once a field.
         width_px: Count = 1376, 16..=32768, "pixels";
@@ -30,35 +31,35 @@ section! {
         /// to the objective.
         centre_um: Number = 0.0, -100..=100, "µm";
         /// What becomes of the planes.
-        picture: Picture = Picture::Planes;
+        output: FocusOutput = FocusOutput::Planes;
         /// How much of its noise a fused picture shares with the next pixel of the row.
-        fused_noise_across: Number = 0.2, 0..=0.5;
+        noise_correlation_x: Number = 0.2, 0..=0.5;
         /// The same with the next pixel of the column.
-        fused_noise_down: Number = 0.4, 0..=0.5;
+        noise_correlation_y: Number = 0.4, 0..=0.5;
         /// How much more it shares with the next pixel down to the right than with that down to the left (half of the
         /// difference): pictures that were turned or shifted by parts of a pixel have some.
-        fused_noise_skew: Number = 0.0, -0.1..=0.1;
+        noise_correlation_diagonal: Number = 0.0, -0.1..=0.1;
     }
 }
 
 section! {
     /// What becomes of the planes of a focus stack.
-    pub enum Picture {
+    pub enum FocusOutput {
         /// Each is a picture.
         Planes,
         /// They are fused to one picture of extended focus: everything as the plane that shows it sharpest, with noise that
         /// neighbouring pixels share.
-        Extended,
+        Edf,
     }
 }
 
 section! {
     /// How evenly the lamp lights the field.
-    pub enum Illumination, by default Bowl {
+    pub enum Illumination, by default Quadratic {
         /// The paper's: distance to the image's border to the power of an exponent (Eq. 8).
         Border(Border),
         /// A smooth bowl, 1 − x2·x² − y2·y² over −1..1, as measured on real fields.
-        Bowl(Bowl),
+        Quadratic(Quadratic),
     }
 }
 
@@ -72,13 +73,13 @@ section! {
 
 section! {
     /// A smooth bowl of light, 1 − x2·x² − y2·y² over −1..1, as measured on real fields.
-    pub struct Bowl {
+    pub struct Quadratic {
         /// Fall towards the left and right border, as a fraction of the centre.
-        x2: Number = Number::uniform(0.01, 0.055), 0..=0.45;
+        falloff_x: Number = Number::uniform(0.01, 0.055), 0..=0.45;
         /// Fall towards the upper and lower border, as a fraction of the centre.
-        y2: Number = Number::uniform(0.0, 0.025), 0..=0.45;
+        falloff_y: Number = Number::uniform(0.0, 0.025), 0..=0.45;
         /// Where the top of the bowl lies, as a fraction of half the field to either side.
-        off_centre: Number = Number::uniform(0.0, 0.25), 0..=0.9;
+        centre_offset: Number = Number::uniform(0.0, 0.25), 0..=0.9;
     }
 }
 
@@ -90,9 +91,9 @@ section! {
         /// How evenly the lamp lights the field.
         illumination: Illumination;
         /// Strength of Perlin noise in the light, as a fraction of the largest grey level (c_pe of Eq. 9).
-        scatter: Number = Number::uniform(0.015, 0.045), 0..=0.5;
+        texture: Number = Number::uniform(0.015, 0.045), 0..=0.5;
         /// Size of the cells of that noise.
-        scatter_um: Number = 60.0, 1..=10000, "µm";
+        texture_um: Number = 60.0, 1..=10000, "µm";
     }
 }
 

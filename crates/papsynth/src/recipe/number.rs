@@ -153,6 +153,37 @@ impl Number {
         random::count(self.draw(rng))
     }
 
+    /// Returns the mean of the drawn values.
+    #[must_use]
+    pub fn mean(&self) -> f64 {
+        self.mean_of(|value| value)
+    }
+
+    /// Returns the mean of the drawn values, rounded to counts.
+    pub(crate) fn mean_count(&self) -> f64 {
+        self.mean_of(|value| random::count(value) as f64)
+    }
+
+    /// Returns the mean of a function of the drawn values.
+    fn mean_of(&self, of: impl Fn(f64) -> f64) -> f64 {
+        /// Points of the midpoint rule over the bounds.
+        const POINTS: u32 = 4096;
+        let Self::Drawn { law, .. } = self else { return of(self.bounds()[0]) };
+        let [low, high] = self.bounds();
+        let is_within = |value: &&f64| (low..=high).contains(*value);
+        if let Law::Choice(values) = law {
+            let kept: Vec<f64> = values.iter().filter(is_within).map(|value| of(*value)).collect();
+            return kept.iter().sum::<f64>() / kept.len().max(1) as f64;
+        }
+        let [from, to] = [law.scaled(low), law.scaled(high)];
+        let points = (0..POINTS).map(|i| from + (to - from) * (f64::from(i) + 0.5) / f64::from(POINTS));
+        let (sum, weights) = points.fold((0.0, 0.0), |(sum, weights), x| {
+            let (value, weight) = law.at(x);
+            (sum + weight * of(value), weights + weight)
+        });
+        if weights > 0.0 { sum / weights } else { of(0.5 * (low + high)) }
+    }
+
     /// What is wrong with this number where something is counted: what is written out must be whole, what is drawn from a
     /// range is rounded.
     pub(crate) fn fraction(&self) -> Option<String> {
@@ -215,6 +246,26 @@ impl Law {
             Self::Normal(mean, sd) => mean + sd * random::normal(rng),
             Self::LogNormal(median, log_sd) => median * libm::exp(log_sd * random::normal(rng)),
             Self::Choice(values) => values.get(random::below(values.len(), rng)).copied().unwrap_or(0.0),
+        }
+    }
+
+    /// Returns the value on the scale on which [`Law::at`] is uniform or normal: standard deviations from the centre.
+    fn scaled(&self, value: f64) -> f64 {
+        match self {
+            Self::Normal(mean, sd) if *sd > 0.0 => (value - mean) / sd,
+            Self::LogNormal(median, log_sd) if *log_sd > 0.0 && value > 0.0 => libm::log(value / median) / log_sd,
+            Self::Normal(..) => 0.0,
+            Self::LogNormal(..) => -REACH_SD,
+            Self::Uniform(..) | Self::Choice(_) => value,
+        }
+    }
+
+    /// Returns the value at a place of that scale, and its relative density there.
+    fn at(&self, x: f64) -> (f64, f64) {
+        match self {
+            Self::Normal(mean, sd) => (mean + sd * x, libm::exp(-0.5 * x * x)),
+            Self::LogNormal(median, log_sd) => (median * libm::exp(log_sd * x), libm::exp(-0.5 * x * x)),
+            Self::Uniform(..) | Self::Choice(_) => (x, 1.0),
         }
     }
 
@@ -338,28 +389,52 @@ impl<'de> Visitor<'de> for NumberVisitor {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Number, A::Error> {
-        let (mut law, mut min, mut max) = (None, f64::NEG_INFINITY, f64::INFINITY);
+        let mut entries = Entries::default();
         while let Some(name) = map.next_key::<String>()? {
-            match name.as_str() {
-                "min" => min = map.next_value()?,
-                "max" => max = map.next_value()?,
-                "uniform" | "normal" | "log_normal" if law.is_none() => {
-                    let [a, b]: [f64; 2] = map.next_value()?;
-                    law = Some(match name.as_str() {
-                        "uniform" => Law::Uniform(a, b),
-                        "normal" => Law::Normal(a, b),
-                        _ => Law::LogNormal(a, b),
-                    });
-                }
-                "choice" if law.is_none() => law = Some(Law::Choice(map.next_value()?)),
-                "uniform" | "normal" | "log_normal" | "choice" => {
-                    return Err(de::Error::custom("a distribution has one law, this one has two"));
-                }
-                other => return Err(de::Error::unknown_field(other, LAWS)),
-            }
+            entries.take(&name, &mut map)?;
         }
-        let law =
-            law.ok_or_else(|| de::Error::custom("expected one of `uniform`, `normal`, `log_normal`, `choice`"))?;
+        entries.finish()
+    }
+}
+
+/// The entries of a table that describes a distribution.
+#[derive(Default)]
+pub(crate) struct Entries {
+    law: Option<Law>,
+    min: Option<f64>,
+    max: Option<f64>,
+}
+
+impl Entries {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.law.is_none() && self.min.is_none() && self.max.is_none()
+    }
+
+    /// Reads the value of the entry `name`.
+    pub(crate) fn take<'de, A: MapAccess<'de>>(&mut self, name: &str, map: &mut A) -> Result<(), A::Error> {
+        match name {
+            "min" => self.min = Some(map.next_value()?),
+            "max" => self.max = Some(map.next_value()?),
+            "uniform" | "normal" | "log_normal" if self.law.is_none() => {
+                let [a, b]: [f64; 2] = map.next_value()?;
+                self.law = Some(match name {
+                    "uniform" => Law::Uniform(a, b),
+                    "normal" => Law::Normal(a, b),
+                    _ => Law::LogNormal(a, b),
+                });
+            }
+            "choice" if self.law.is_none() => self.law = Some(Law::Choice(map.next_value()?)),
+            "uniform" | "normal" | "log_normal" | "choice" => {
+                return Err(de::Error::custom("expected one distribution, found two"));
+            }
+            other => return Err(de::Error::unknown_field(other, LAWS)),
+        }
+        Ok(())
+    }
+
+    pub(crate) fn finish<E: de::Error>(self) -> Result<Number, E> {
+        let law = self.law.ok_or_else(|| E::custom("expected one of `uniform`, `normal`, `log_normal`, `choice`"))?;
+        let (min, max) = (self.min.unwrap_or(f64::NEG_INFINITY), self.max.unwrap_or(f64::INFINITY));
         Ok(Number::Drawn { law, min, max })
     }
 }
@@ -370,6 +445,16 @@ impl schemars::JsonSchema for Number {
     }
 
     fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({
+            "description": "A number, or a distribution it is drawn from.",
+            "anyOf": Self::forms(),
+        })
+    }
+}
+
+impl Number {
+    /// Returns the JSON schemas of a plain number and of each distribution.
+    pub(crate) fn forms() -> Vec<serde_json::Value> {
         let pair = serde_json::json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 });
         let law = |name: &str, values: serde_json::Value| {
             serde_json::json!({
@@ -379,16 +464,13 @@ impl schemars::JsonSchema for Number {
                 "additionalProperties": false,
             })
         };
-        schemars::json_schema!({
-            "description": "A number, or a distribution it is drawn from.",
-            "anyOf": [
-                { "type": "number" },
-                law("uniform", pair.clone()),
-                law("normal", pair.clone()),
-                law("log_normal", pair),
-                law("choice", serde_json::json!({ "type": "array", "items": { "type": "number" }, "minItems": 1 })),
-            ]
-        })
+        vec![
+            serde_json::json!({ "type": "number" }),
+            law("uniform", pair.clone()),
+            law("normal", pair.clone()),
+            law("log_normal", pair),
+            law("choice", serde_json::json!({ "type": "array", "items": { "type": "number" }, "minItems": 1 })),
+        ]
     }
 }
 
@@ -444,7 +526,7 @@ mod tests {
     fn what_is_wrong_is_said() {
         assert!(parse("{ unifrom = [1, 2] }").unwrap_err().contains("unknown field `unifrom`"));
         assert!(parse("{ min = 2 }").unwrap_err().contains("expected one of `uniform`"));
-        assert!(parse("{ uniform = [1, 2], choice = [1] }").unwrap_err().contains("one law"));
+        assert!(parse("{ uniform = [1, 2], choice = [1] }").unwrap_err().contains("found two"));
         assert!(parse("\"many\"").is_err());
         assert!(parse("{ uniform = [2, 1] }").unwrap().problem(0.0, 9.0).unwrap().contains("swapped"));
         assert!(parse("nan").unwrap().problem(0.0, 9.0).unwrap().contains("finite"));

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
+use super::abundance::PER_MM2;
 use super::diagnose::{Schema, Section};
 use super::whole::Recipe;
 
@@ -20,7 +21,8 @@ impl Recipe {
         let mut out = String::from(
             "# A recipe of papsynth. Lengths are in micrometres, angles in degrees, absorbances decadic.\n\
              # Every number may be a distribution: { uniform = [low, high] }, { normal = [mean, sd] },\n\
-             # { log_normal = [median, sd of the logarithm] } or { choice = [a, b, c] }, each with `min` and `max` if wished.\n\n",
+             # { log_normal = [median, sd of the logarithm] } or { choice = [a, b, c] }, each with optional `min` and `max`.\n\
+             # Counts are per field, or per mm² if written as { per_mm2 = 180 } or { per_mm2 = { uniform = [90, 270] } }.\n\n",
         );
         table(&mut out, "", &value, Schema::new().root());
         out
@@ -79,8 +81,8 @@ fn key(name: &str) -> String {
 /// line.
 #[must_use]
 pub fn is_toml_table(value: &Value) -> bool {
-    const LAWS: [&str; 4] = ["uniform", "normal", "log_normal", "choice"];
-    value.as_object().is_some_and(|map| !LAWS.iter().any(|law| map.contains_key(*law)))
+    const INLINE: [&str; 5] = ["uniform", "normal", "log_normal", "choice", PER_MM2];
+    value.as_object().is_some_and(|map| !INLINE.iter().any(|name| map.contains_key(*name)))
 }
 
 /// A value of a recipe, as JSON, on one line of TOML.

@@ -6,7 +6,7 @@ use super::section::section;
 section! {
     /// A whole slide, as a scanner sees it frame by frame (`papsynth slide`); fields do not look at it.
     ///
-    /// Counts of cells and debris are those of a field, whose size then says how dense they lie where the deposit is full.
+    /// Densities of cells and debris are those within the deposit. A count per field is divided by the mean area of a field.
     pub struct Scan {
         /// Width of the slide's picture.
         width_px: u32 = 56_000, 64..=1000000, "pixels";
@@ -15,9 +15,9 @@ section! {
         /// Side of the square frames that the scanner's camera takes: each is lit and exposed by itself.
         frame_px: u32 = 2048, 128..=8192, "pixels";
         /// Share of the unevenness of the lamp (`background.illumination`) that the scanner's correction leaves.
-        shading_left: f64 = 0.15, 0..=1;
+        residual_shading: f64 = 0.15, 0..=1;
         /// Farthest that an object's picture may reach from the object's middle; what would reach further is refused.
-        reach_um: f64 = 400.0, 10..=2000, "µm";
+        max_object_radius_um: f64 = 400.0, 10..=2000, "µm";
         /// Where the material lies.
         deposit: Deposit;
     }
@@ -36,10 +36,10 @@ section! {
         /// Distance over which it thins out at its edge.
         edge_um: Number = 120.0, 1..=100000, "µm";
         /// How unevenly the cells lie: standard deviation of the logarithm of their density.
-        unevenness: Number = 0.35, 0..=1;
+        density_variation: Number = 0.35, 0..=1;
         /// Size of its dense and thin patches.
-        patch_um: Number = 900.0, 50..=100000, "µm";
+        density_scale_um: Number = 900.0, 50..=100000, "µm";
         /// Density beyond its edge, relative to that within.
-        outside: Number = 0.01, 0..=1;
+        outside_density: Number = 0.01, 0..=1;
     }
 }

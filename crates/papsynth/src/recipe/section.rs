@@ -31,6 +31,8 @@ pub(crate) struct Declared<'a> {
 pub(crate) enum Value<'a> {
     /// A number or a distribution.
     Real(Cow<'a, Number>),
+    /// A density per mm².
+    Density(&'a Number),
     /// A whole number, exact beyond 2⁵³.
     Whole(u64),
 }
@@ -41,6 +43,7 @@ impl Declared<'_> {
         let Bounds { low, high, whole } = self.bounds;
         let [range, fraction] = match &self.value {
             Value::Real(number) => [number.problem(low, high), number.fraction().filter(|_| whole)],
+            Value::Density(number) => [number.problem(low, high).map(|problem| format!("{problem} per mm²")), None],
             Value::Whole(value) => {
                 let outside = *value < low as u64 || *value > high as u64;
                 [outside.then(|| format!("{value} is outside {low} to {high}")), None]
@@ -174,11 +177,15 @@ macro_rules! section {
 
     (@default Number $default:expr) => { $crate::recipe::number::Number::from($default) };
     (@default Count $default:expr) => { $crate::recipe::number::Number::from($default) };
+    (@default Abundance $default:expr) => { $crate::recipe::abundance::Abundance::from($default) };
     (@default $Kind:ident $default:expr) => { $default };
     (@default $Kind:ident) => { <$Kind>::default() };
 
     (@bounds $Kind:ident) => { None };
     (@bounds Count $low:literal $high:literal) => {
+        Some($crate::recipe::section::Bounds { low: $low as f64, high: $high as f64, whole: true })
+    };
+    (@bounds Abundance $low:literal $high:literal) => {
         Some($crate::recipe::section::Bounds { low: $low as f64, high: $high as f64, whole: true })
     };
     (@bounds $Kind:ident $low:literal $high:literal) => {
@@ -250,7 +257,7 @@ macro_rules! section {
 
 /// The name of a number and the number itself: `named!(recipe.slide.depth_um)` names it `slide.depth_um`, and
 /// `named!(self.count)` names it `count`. With the path of a section, the name is the dotted path:
-/// `named!("layout", swath.width_um)` names it `layout.width_um`.
+/// `named!("layout", band.width_um)` names it `layout.width_um`.
 macro_rules! named {
     ($section:literal, $owner:ident.$number:ident) => {
         (concat!($section, ".", stringify!($number)), &$owner.$number)

@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::abundance::Abundance;
 use super::dyes::DyeAmounts;
 use super::number::{Count, Number};
 use super::section::{Bounds, Declared, Part, section, within};
@@ -16,16 +17,16 @@ section! {
         /// Depth over which the cells of a field lie.
         depth_um: Number = Number::uniform(1.0, 4.0), 0..=1000, "µm";
         /// Size of the cells of the Perlin noise that says how depth varies over the field.
-        relief_um: Number = 90.0, 1..=10000, "µm";
+        depth_scale_um: Number = 90.0, 1..=10000, "µm";
         /// Width of the median filter on that noise.
-        median_um: Number = 20.0, 0..=1000, "µm";
+        depth_filter_um: Number = 20.0, 0..=1000, "µm";
         /// Standard deviation of a cell's own depth about the relief: cells that lie on each other.
         stacking_um: Number = 0.6, 0..=100, "µm";
         /// Least distance between the middles of two cells; drawn once a field.
         spacing_um: Number = 9.0, 0..=1000, "µm";
         /// Fields that are taken of one slide: images 0 to n − 1 show the first, the next n the second. Fields of one
         /// slide were stained together.
-        fields: usize = 16, 1..=1000000;
+        fields_per_slide: usize = 16, 1..=1000000;
     }
 }
 
@@ -38,9 +39,9 @@ pub enum Layout {
     /// Round clusters at random places, and some cells outside them.
     Clusters(Clusters),
     /// A band of material across the image.
-    Swath(Swath),
+    Band(Band),
     /// A grey image that is stretched over the field: white is likely, black never happens.
-    Map {
+    DensityMap {
         /// File of the image, relative to the recipe.
         path: String,
     },
@@ -53,7 +54,7 @@ section! {
     /// Round clusters at random places, and some cells outside them.
     pub struct Clusters {
         /// Number of clusters; drawn once a field.
-        count: Count = Number::uniform(5.0, 11.0), 1..=10000;
+        count: Abundance = Abundance::per_mm2(Number::uniform(55.0, 125.0)), 1..=10000, "per field or per mm²";
         /// Radius (standard deviation) of a cluster; drawn for each cluster.
         radius_um: Number = Number::uniform(14.0, 34.0), 1..=10000, "µm";
         /// Weight of the places outside all clusters, relative to a cluster's centre.
@@ -63,7 +64,7 @@ section! {
 
 section! {
     /// A band of material across the image.
-    pub struct Swath {
+    pub struct Band {
         /// Width (standard deviation) of the band.
         width_um: Number = 40.0, 1..=10000, "µm";
         /// Weight of the places outside the band, relative to its middle.
@@ -97,9 +98,9 @@ impl Default for Layout {
 impl Part for Layout {
     fn list<'a>(&'a self, path: &str, bounds: Option<Bounds>, found: &mut Vec<Declared<'a>>) {
         match self {
-            Self::Uniform {} | Self::Map { .. } => {}
+            Self::Uniform {} | Self::DensityMap { .. } => {}
             Self::Clusters(clusters) => clusters.list(path, bounds, found),
-            Self::Swath(swath) => swath.list(path, bounds, found),
+            Self::Band(band) => band.list(path, bounds, found),
             Self::Labels(labels) => labels.list(path, bounds, found),
         }
     }
@@ -118,11 +119,18 @@ impl Part for Cells {
 
 /// The cells of the default slide.
 pub(super) fn default_cells() -> Cells {
-    let cells =
-        [("intermediate", 8.0, 24.0), ("superficial", 2.0, 10.0), ("parabasal", 0.0, 1.5), ("metaplastic", 0.0, 1.5)];
+    let cells = [
+        ("intermediate", 85.0, 250.0),
+        ("superficial", 20.0, 105.0),
+        ("parabasal", 0.0, 15.0),
+        ("metaplastic", 0.0, 15.0),
+    ];
     let mix = |(class, least, most): (&str, f64, f64)| {
         let tints = if class == "superficial" { TintMix::superficial() } else { TintMix::default() };
-        (class.to_owned(), CellMix { count: Number::uniform(least, most), tints, ..CellMix::default() })
+        (
+            class.to_owned(),
+            CellMix { count: Abundance::per_mm2(Number::uniform(least, most)), tints, ..CellMix::default() },
+        )
     };
     cells.map(mix).into()
 }
@@ -131,7 +139,7 @@ section! {
     /// How many cells of a class there are, and how they differ from the model's.
     pub struct CellMix {
         /// Number of cells of this class; drawn once a field.
-        count: Count = 10, 0..=100000;
+        count: Abundance = Abundance::per_mm2(110), 0..=100000, "per field or per mm²";
         /// Factor on the size of the whole cell; drawn for each cell.
         size: Number = 1.0, 0.1..=10;
         /// Factor on the absorbance of its cytoplasm; drawn for each cell.
@@ -149,7 +157,7 @@ section! {
     /// How cells of a class lie together.
     pub struct Group {
         /// The form of a group.
-        form: GroupForm = GroupForm::Alone;
+        form: GroupForm = GroupForm::Single;
         /// Cells of a group; drawn for each group.
         size: Count = 1, 1..=1000;
         /// Distance between the middles of neighbours, relative to their diameter: below 1 they overlap.
@@ -161,9 +169,9 @@ section! {
     /// The form of a group of cells.
     pub enum GroupForm {
         /// Every cell has a place of its own, where the layout lets it lie.
-        Alone,
+        Single,
         /// An irregular heap, each cell beside one that lies there already.
-        Heap,
+        Aggregate,
         /// One layer, cell beside cell as in a pavement seen from above: the honeycomb of endocervical cells.
         Honeycomb,
         /// A row of cells side by side, all turned the same way: the palisade of columnar cells.
@@ -221,7 +229,7 @@ section! {
         /// Probability that a rim is rolled up.
         roll: Number = 0.18, 0..=1;
         /// Probability that the cell is folded over completely, like a cigar.
-        cigar: Number = 0.02, 0..=1;
+        folded_over: Number = 0.02, 0..=1;
         /// How far in from the rim a flap begins, as a fraction of the cell's radius.
         depth: Number = Number::uniform(0.10, 0.50), 0.02..=0.9;
         /// Radius of the bend.
@@ -237,19 +245,19 @@ section! {
         /// How the cytoplasm becomes a sheet.
         sheet: Sheet (undrawn) = Sheet::Xpbd;
         /// Area of the flat sheet relative to the cell's: more makes more wrinkles.
-        excess: Number (given f64) = Number::uniform(1.04, 1.16), 1..=2;
+        excess_area: Number (given f64) = Number::uniform(1.04, 1.16), 1..=2;
         /// Parts that lie doubled back.
         folds: Folds (undrawn);
         /// How nearly straight the sides of a cell run between its corners: 0 is not at all.
-        corners: Number (given f64) = Number::uniform(0.10, 0.60), 0..=1;
+        angularity: Number (given f64) = Number::uniform(0.10, 0.60), 0..=1;
         /// Notches in its rim.
         notches: Number (given usize) = Number::uniform(0.0, 14.0), 0..=20;
         /// Tongues that stand out of its rim.
-        tongues: Number (given usize) = Number::uniform(0.0, 9.0), 0..=20;
+        protrusions: Number (given usize) = Number::uniform(0.0, 9.0), 0..=20;
         /// Wrinkles of a cell: narrow creases in which the sheet lies doubled.
         wrinkles: Number (given usize) = Number::log_normal(7.0, 0.6), 0..=100;
         /// Thickness that a wrinkle adds at its crest, relative to the flat sheet.
-        wrinkle: Number (given f64) = Number::log_normal(0.42, 0.42), 0..=5;
+        wrinkle_thickness: Number (given f64) = Number::log_normal(0.42, 0.42), 0..=5;
         /// Width of a wrinkle (standard deviation of its crest).
         wrinkle_um: Number (given f64) = Number::uniform(0.18, 0.5), 0.05..=5, "µm";
         /// How much denser and more granular the cytoplasm is round the nucleus than outside.
@@ -277,8 +285,8 @@ section! {
         rim_um: Number (given f64) = Number::log_normal(2.2, 0.36), 0..=10, "µm";
         /// How much thicker the sheet is towards one side (standard deviation of the slope, relative to its thickness
         /// and the cell's radius).
-        wedge: Number
-            (given [f64; 2] as wedge: "How much thicker to the right and below, relative to its thickness, a radius away.")
+        thickness_gradient: Number
+            (given [f64; 2] as thickness_gradient: "How much thicker to the right and below, relative to its thickness, a radius away.")
             = 0.18, 0..=1;
         /// How late light comes through a flat sheet: thicker parts and folds in proportion. It shows as bright and
         /// dark rims that change places when the focus passes.
@@ -362,7 +370,7 @@ section! {
         dome: Number = Number::uniform(0.3, 0.85), 0..=1;
         /// How much thicker a nucleus is towards one side (standard deviation of the slope, relative to its thickness
         /// and radius).
-        wedge: Number = 0.2, 0..=1;
+        thickness_gradient: Number = 0.2, 0..=1;
         /// Part of the variance of chromatin that is coarse, a micrometre and a half wide: what lies above and below
         /// the grains in focus.
         clumping: Number = Number::uniform(0.0, 0.4), 0..=1;

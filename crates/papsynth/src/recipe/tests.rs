@@ -14,7 +14,7 @@ const LEAST: usize = 235;
 /// Recipes that have every section and every form of it between them.
 fn recipes() -> [Recipe; 3] {
     let mut paper = Preset::Paper2015.recipe();
-    paper.layout = Layout::Swath(Swath::default());
+    paper.layout = Layout::Band(Band::default());
     let colour = Recipe {
         light: Light::Colour(Colour::default()),
         layout: Layout::Labels(Labels { path: "labels.png".to_owned(), ..Labels::default() }),

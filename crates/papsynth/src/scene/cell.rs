@@ -76,7 +76,7 @@ pub enum FoldForm {
     /// It is rolled up.
     Roll,
     /// Both sides are folded to the middle.
-    Cigar,
+    FoldedOver,
 }
 
 /// The nucleus of a cell, its numbers drawn.
@@ -104,7 +104,7 @@ pub struct NucleusBody {
     /// Part of the variance of its chromatin that is coarse.
     pub clumping: f64,
     /// How much thicker it is at its rim than in its middle, to the right and below.
-    pub wedge: [f64; 2],
+    pub thickness_gradient: [f64; 2],
     /// Small, dark, without structure.
     pub pyknotic: bool,
     /// Strength of wrinkles, 0 if it has none.

@@ -1,5 +1,7 @@
 //! Drawing epithelial cells: places, sizes, stains, folds.
 
+use std::collections::BTreeMap;
+
 use rand_core::Rng;
 
 use crate::error::Cause;
@@ -7,17 +9,35 @@ use crate::key::{Key, Stream};
 use crate::model::{CellClass, HaloStatistics, Model};
 use crate::random;
 use crate::recipe::section::named;
-use crate::recipe::{CellMix, Number, Recipe};
+use crate::recipe::{CellMix, GroupForm, Number, Recipe};
 
 use super::cell::{CellBody, CellDetail, Fold, FoldForm, Halo, NucleusBody};
 use super::depth::Relief;
-use super::field::Object;
+use super::field::{ClassCount, Object};
 use super::groups::{Groups, Place};
-use super::layout::{Places, weight_map};
+use super::layout::{Places, weights};
 use super::stain::FieldStain;
-use super::view::{FieldNumbers, View};
+use super::view::{FieldNumbers, Region, View};
 use super::weight::WeightMap;
 use crate::debris::Body;
+
+/// The cells of a field and its margin.
+pub(super) struct Cells {
+    pub(super) objects: Vec<Object>,
+    pub(super) field: Region,
+    pub(super) region: Region,
+    /// Cells by class.
+    pub(super) counts: BTreeMap<String, ClassCount>,
+}
+
+/// What happens to cells that find no place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Crowding {
+    /// An error.
+    Error,
+    /// They are left out.
+    LeaveOut,
+}
 
 /// Draws every cell of a field, class by class.
 pub(super) fn draw_cells(
@@ -25,41 +45,84 @@ pub(super) fn draw_cells(
     model: &Model,
     given: Option<&WeightMap>,
     view: View,
-    field: &FieldNumbers,
+    numbers: &FieldNumbers,
     stain: &FieldStain<'_>,
-) -> Result<Vec<Object>, Cause> {
-    let counts: Vec<usize> =
-        recipe.cells.iter().map(|(class, mix)| field.count((&format!("cells.{class}.count"), &mix.count))).collect();
-    let total = counts.iter().sum();
-    if total == 0 {
-        return Ok(Vec::new());
-    }
-    let map = weight_map(&recipe.layout, given, view, field)?;
-    let spacing = field.draw(named!(recipe.slide.spacing_um));
-    let mut places = Places::new(&map, total, spacing, view)?;
+    crowding: Crowding,
+) -> Result<Cells, Cause> {
+    let weights = weights(&recipe.layout, given, view, numbers)?;
+    let count = |(class, mix): (&String, &CellMix)| {
+        numbers.number_of((&format!("cells.{class}.count"), &mix.count), weights.populated_mm2) as usize
+    };
+    let requested: Vec<usize> = recipe.cells.iter().map(count).collect();
+    let spacing = numbers.draw(named!(recipe.slide.spacing_um));
+    let mut places = Places::new(&weights, spacing)?;
+    let wanted = fitting(recipe, &places, &requested, crowding)?;
     let relief = Relief::new(
         view.size_um(),
-        field.draw(named!(recipe.slide.depth_um)),
-        field.draw(named!(recipe.slide.relief_um)),
-        field.draw(named!(recipe.slide.median_um)),
-        field.key.stream("field", 0, "slide.relief").next_u64(),
+        numbers.draw(named!(recipe.slide.depth_um)),
+        numbers.draw(named!(recipe.slide.depth_scale_um)),
+        numbers.draw(named!(recipe.slide.depth_filter_um)),
+        numbers.key.stream("field", 0, "slide.relief").next_u64(),
     );
-    let mut cells = Vec::with_capacity(total);
+    let mut objects = Vec::with_capacity(wanted.iter().sum());
+    let mut counts = BTreeMap::new();
     let mut groups_begun = 0;
-    for ((name, mix), count) in recipe.cells.iter().zip(counts) {
+    for (((name, mix), requested), wanted) in recipe.cells.iter().zip(requested).zip(wanted) {
         let kind = Class { name, mix, class: model.class(name)? };
         let mut groups = Groups::new(&mix.group, groups_begun);
-        for _ in 0..count {
-            let number = cells.len() as u64;
-            let cell = Drawn::new(recipe, kind, stain, field.key, number);
-            let mut place_rng = field.key.stream("cell", number, "place");
-            let place = groups.next(cell.body.radius_um, |rng| places.next(rng), &mut place_rng)?;
+        let in_margin = mix.count.is_density();
+        let before = objects.len();
+        for _ in 0..wanted {
+            let number = objects.len() as u64;
+            let cell = Drawn::new(recipe, kind, stain, numbers.key, number);
+            let mut place_rng = numbers.key.stream("cell", number, "place");
+            let place = groups.next(cell.body.radius_um, |rng| places.next(in_margin, rng), &mut place_rng);
+            let place = match place {
+                Err(Cause::Crowded { .. }) if crowding == Crowding::LeaveOut => break,
+                place => place?,
+            };
             let depth_um = relief.at(place.centre_um);
-            cells.push(cell.lie(kind, number, &place, depth_um));
+            objects.push(cell.lie(kind, number, &place, depth_um));
         }
         groups_begun = groups.begun();
+        let placed = &objects[before..];
+        let in_field = placed.iter().filter(|cell| weights.field.touches(cell.centre_um, 0.0)).count();
+        let [requested, placed, in_field] = [requested, placed.len(), in_field].map(|count| count as u64);
+        counts.insert(name.clone(), ClassCount { requested, placed, in_field });
     }
-    Ok(cells)
+    Ok(Cells { objects, field: weights.field, region: weights.region, counts })
+}
+
+/// Returns how many cells of each class to place: those requested, or fewer of each class where they cannot fit.
+fn fitting(recipe: &Recipe, places: &Places, requested: &[usize], crowding: Crowding) -> Result<Vec<usize>, Cause> {
+    let mut wanted = requested.to_vec();
+    for in_margin in [false, true] {
+        // Of a group only the first cell keeps its distance.
+        let first = |(mix, count): (&CellMix, &usize)| match mix.group.form {
+            GroupForm::Single => *count,
+            _ => random::count((*count as f64 / mix.group.size.mean_count().max(1.0)).ceil()),
+        };
+        let of_area = |mix: &CellMix| mix.count.is_density() == in_margin;
+        let cells = recipe.cells.values().zip(requested).filter(|(mix, _)| of_area(mix));
+        let count: usize = cells.map(first).sum();
+        if count < 2 {
+            continue;
+        }
+        places.check_tries(count, in_margin)?;
+        match places.check(count, in_margin) {
+            Ok(()) => {}
+            Err(cause) if crowding == Crowding::Error => return Err(cause),
+            Err(_) => {
+                let fraction = places.room(in_margin) / count as f64;
+                for (mix, wanted) in recipe.cells.values().zip(&mut wanted) {
+                    if of_area(mix) {
+                        *wanted = random::count((*wanted as f64 * fraction).ceil());
+                    }
+                }
+            }
+        }
+    }
+    Ok(wanted)
 }
 
 /// A class of cells of a recipe.
@@ -170,11 +233,11 @@ fn draw_body(
         dome: own_number(named!(recipe.nucleus.dome)),
         edge_um: recipe.nucleus.edge_um.draw(&mut own("nucleus.edge")),
         clumping: own_number(named!(recipe.nucleus.clumping)),
-        wedge: {
-            let (name, wedge) = named!(recipe.nucleus.wedge);
+        thickness_gradient: {
+            let (name, slope) = named!(recipe.nucleus.thickness_gradient);
             let mut rng = own(name);
-            let wedge = wedge.draw(&mut rng);
-            [0, 1].map(|_| wedge * random::normal(&mut rng))
+            let slope = slope.draw(&mut rng);
+            [0, 1].map(|_| slope * random::normal(&mut rng))
         },
         pyknotic,
         wrinkle: if wrinkled { random::between(0.3, 1.0, rng) } else { 0.0 },
@@ -215,27 +278,27 @@ fn normal_at_least(mean: f64, sd: f64, share: f64, rng: &mut Stream) -> f64 {
 
 fn draw_detail(recipe: &Recipe, pliability: f64, rng: &mut Stream, own: &impl Fn(&str) -> Stream) -> CellDetail {
     let cytoplasm = &recipe.cytoplasm;
-    let excess = cytoplasm.excess.draw(rng);
+    let excess_area = cytoplasm.excess_area.draw(rng);
     let granular = random::chance(cytoplasm.granular.draw(rng), rng);
     let granules = cytoplasm.granules.draw(rng);
-    let (name, slope) = named!(recipe.cytoplasm.wedge);
+    let (name, slope) = named!(recipe.cytoplasm.thickness_gradient);
     let mut wedge_rng = own(name);
     let slope = slope.draw(&mut wedge_rng);
-    let wedge = [0, 1].map(|_| slope * random::normal(&mut wedge_rng));
+    let thickness_gradient = [0, 1].map(|_| slope * random::normal(&mut wedge_rng));
     let own = |(name, number): (&str, &Number)| number.draw(&mut own(name));
     let pliable = |named: (&str, &Number)| pliability * own(named);
     CellDetail {
-        excess,
-        corners: pliable(named!(recipe.cytoplasm.corners)),
+        excess_area,
+        angularity: pliable(named!(recipe.cytoplasm.angularity)),
         notches: random::count(pliable(named!(recipe.cytoplasm.notches))),
-        tongues: random::count(pliable(named!(recipe.cytoplasm.tongues))),
+        protrusions: random::count(pliable(named!(recipe.cytoplasm.protrusions))),
         wrinkles: random::count(pliable(named!(recipe.cytoplasm.wrinkles))),
-        wrinkle: own(named!(recipe.cytoplasm.wrinkle)),
+        wrinkle_thickness: own(named!(recipe.cytoplasm.wrinkle_thickness)),
         wrinkle_um: own(named!(recipe.cytoplasm.wrinkle_um)),
         endoplasm: own(named!(recipe.cytoplasm.endoplasm)),
         granules: if granular { granules } else { 0.0 },
         rim_um: own(named!(recipe.cytoplasm.rim_um)),
-        wedge,
+        thickness_gradient,
         ..cytoplasm.one(rng)
     }
 }
@@ -255,29 +318,29 @@ fn draw_halo(halo: Option<&HaloStatistics>, nucleus_um: f64, cell_um: f64, rng: 
 fn draw_fold(recipe: &Recipe, pliability: f64, rng: &mut Stream) -> Option<Fold> {
     let folds = &recipe.cytoplasm.folds;
     let roll = pliability * folds.roll.draw(rng);
-    let cigar = pliability * folds.cigar.draw(rng);
+    let folded_over = pliability * folds.folded_over.draw(rng);
     let flap = pliability * folds.flap.draw(rng);
     let which = random::uniform(rng);
     let direction_deg = random::between(0.0, 360.0, rng);
     let depth = folds.depth.draw(rng);
     let radius_um = folds.radius_um.draw(rng);
-    let form = if which < cigar {
-        FoldForm::Cigar
-    } else if which < cigar + roll {
+    let form = if which < folded_over {
+        FoldForm::FoldedOver
+    } else if which < folded_over + roll {
         FoldForm::Roll
-    } else if which < cigar + roll + flap {
+    } else if which < folded_over + roll + flap {
         FoldForm::Flap
     } else {
         return None;
     };
     /// A rolled rim takes in less of the cell than a flap.
     const ROLLED: f64 = 0.45;
-    /// Each side of a cigar is folded in from about half of the radius.
-    const CIGAR: f64 = 0.5;
+    /// Each side of a cell that is folded over is folded in from about half of the radius.
+    const FOLDED_OVER: f64 = 0.5;
     let depth = match form {
         FoldForm::Flap => depth,
         FoldForm::Roll => depth * ROLLED,
-        FoldForm::Cigar => CIGAR,
+        FoldForm::FoldedOver => FOLDED_OVER,
     };
     Some(Fold { form, direction_deg, depth, radius_um })
 }

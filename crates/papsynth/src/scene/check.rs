@@ -27,34 +27,35 @@ const RANGES: &[(&str, f64, f64)] = &[
     ("view.width", 1.0, 32_768.0), ("view.height", 1.0, 32_768.0), ("pixel_um", 0.04, 5.0),
     ("planes_um", -1e5, 1e5), ("first_um", -1e5, 1e5), ("step_um", 0.0, 1e4), ("planes", 1.0, 1e5),
     ("noise_correlation", 0.0, 0.5), ("noise_skew", -0.1, 0.1),
-    ("level", 1e-3, 2.0), ("exponent", 0.0, 10.0), ("x2", 0.0, 1.0), ("y2", 0.0, 1.0), ("top", -10.0, 10.0),
-    ("scatter", 0.0, 1.0), ("scatter_um", 0.1, 1e5),
+    ("level", 1e-3, 2.0), ("exponent", 0.0, 10.0), ("falloff_x", 0.0, 1.0), ("falloff_y", 0.0, 1.0), ("illumination.centre", -10.0, 10.0),
+    ("background.texture", 0.0, 1.0), ("texture_um", 0.1, 1e5),
     ("wavelength_um", 0.4, 0.7), ("bandwidth_um", 0.0, 0.1), ("lamp_k", 2000.0, 10_000.0), ("chromatic_um", -10.0, 10.0),
     ("na", 0.05, 1.6), ("condenser_na", 0.05, 1.6), ("mount_index", 1.0, 2.0), ("immersion_index", 1.0, 2.0),
     ("cover_error_um", -50.0, 50.0), ("spherical", -1.0, 1.0), ("coma", -1.0, 1.0), ("astigmatism", -1.0, 1.0),
     ("extra_blur_um", 0.0, 10.0), ("stray_light", 0.0, 0.5), ("oversampling", 1.0, 4.0), ("slab_um", 0.1, 10.0),
     ("directions", 1.0, 65_536.0), ("sigma_xy_um", 0.0, 20.0), ("sigma_z_um_per_um", 0.0, 10.0), ("feather_um", 0.0, 5.0),
     ("bits", 8.0, 16.0), ("full_well_e", 10.0, 1e7), ("read_noise_e", 0.0, 1e5), ("read_noise_rms_e", 0.0, 1e5),
-    ("offset_dn", 0.0, 32_768.0), ("glare_removed", 0.0, 0.8), ("prnu", 0.0, 0.5), ("dsnu_e", 0.0, 1e5),
+    ("offset_dn", 0.0, 32_768.0), ("glare_subtracted", 0.0, 0.8), ("prnu", 0.0, 0.5), ("dsnu_e", 0.0, 1e5),
     ("exposure_s", 0.0, 1e6), ("dark_current_e_per_s", 0.0, 1e6), ("dark_reference_c", -200.0, 150.0),
     ("temperature_c", -200.0, 150.0), ("dark_doubling_c", 0.1, 100.0), ("blooming", 0.0, 1.0),
     ("blooming_vertical", 0.0, 1.0), ("binning_px", 1.0, 8.0), ("jpeg_quality", 0.0, 100.0),
+    ("attempts", 1.0, 1e3), ("requested", 0.0, 1e15), ("placed", 0.0, 1e15), ("in_field", 0.0, 1e15),
     ("id", 1.0, 4_294_967_295.0), ("centre_um", -1e6, 1e6), ("depth_um", -1e4, 1e4), ("rotation_deg", -1e6, 1e6),
     ("direction_deg", -1e6, 1e6), ("bend_deg", -1e6, 1e6), ("dyes", 0.0, 1e6), ("dyes.nucleus", 0.0, 1e6),
     ("bacillus", 0.0, 1e6), ("speckle", 0.0, 1e6), ("absorbance", 0.0, 1e4), ("cytoplasm_absorbance", 0.0, 1e4),
-    ("texture", 0.0, 1e4), ("shreds", 0.0, 1e4), ("halo", 0.0, 1e4), ("nucleus", 0.0, 1e4), ("phase_rad", -1e3, 1e3),
+    ("texture", 0.0, 1e4), ("shreds", 0.0, 1e4), ("nucleus_absorbance", 0.0, 1e4), ("phase_rad", -1e3, 1e3),
     ("fold.radius_um", 0.01, 5.0), ("radius_um", 0.01, 5e3), ("diameter_um", 0.05, 5e3), ("length_um", 0.05, 5e3), ("width_um", 0.01, 5e3),
-    ("segment_um", 0.05, 50.0), ("yeast_um", 0.05, 20.0), ("cell_um", 0.0, 100.0), ("cloud_um", 0.0, 500.0),
-    ("fibre_um", 0.01, 5.0), ("grain_um", 0.05, 5.0), ("beyond_um", 0.0, 20.0), ("wrinkle_um", 0.01, 5.0),
+    ("segment_length_um", 0.05, 50.0), ("yeast_diameter_um", 0.05, 20.0), ("cytoplasm_diameter_um", 0.0, 100.0), ("colony_radius_um", 0.0, 500.0),
+    ("fibre_width_um", 0.01, 5.0), ("grain_um", 0.05, 5.0), ("overhang_um", 0.0, 20.0), ("wrinkle_um", 0.01, 5.0),
     ("clouds_um", 0.05, 100.0), ("fray_um", 0.0, 5.0), ("rim_um", 0.0, 10.0), ("edge_um", 0.0, 3.0),
     ("rods", 1.0, 100.0), ("segments", 1.0, 100.0), ("cocci", 1.0, 1e5), ("lobes", 0.0, 16.0), ("fibres", 1.0, 1e3),
-    ("dilations", 0.0, 200.0), ("notches", 0.0, 100.0), ("tongues", 0.0, 100.0), ("wrinkles", 0.0, 1e3),
+    ("dilations", 0.0, 200.0), ("notches", 0.0, 100.0), ("protrusions", 0.0, 100.0), ("wrinkles", 0.0, 1e3),
     ("nucleoli", 0.0, 100.0), ("body.rim", 1e-3, 10.0), ("rim", 0.0, 100.0), ("body.width", 0.05, 10.0),
     ("elongation", 0.1, 100.0), ("alpha", 0.0, 1.0), ("beta", 0.0, 2.0), ("waves", 0.0, 10.0), ("pallor", 0.0, 1.0),
     ("granularity", 0.0, 20.0), ("ragged", 0.0, 10.0), ("branches", 0.0, 1.0), ("buds", 0.0, 1.0),
-    ("density", 0.0, 100.0), ("cover", 0.0, 1.0), ("excess", 1.0, 4.0), ("corners", 0.0, 1.0), ("wrinkle", 0.0, 100.0),
+    ("density", 0.0, 100.0), ("coverage", 0.0, 1.0), ("excess_area", 1.0, 4.0), ("angularity", 0.0, 1.0), ("wrinkle", 0.0, 100.0),
     ("endoplasm", 0.0, 100.0), ("clouds", 0.0, 100.0), ("flecks", 0.0, 100.0), ("flecks_threshold", 0.0, 1.0),
-    ("cytoskeleton", 0.0, 100.0), ("grain", 0.0, 100.0), ("granules", 0.0, 1e4), ("wedge", -100.0, 100.0),
+    ("cytoskeleton", 0.0, 100.0), ("grain", 0.0, 100.0), ("granules", 0.0, 1e4), ("thickness_gradient", -100.0, 100.0),
     ("clearing", 0.0, 1.0), ("depth", 0.0, 2.0), ("dome", 0.0, 1.0), ("clumping", 0.0, 1.0), ("off_centre", -10.0, 10.0),
 ];
 
@@ -127,7 +128,7 @@ fn object(value: Value, pixel_um: f64, farthest_um: f64, ids: &mut BTreeSet<u32>
     if let Body::Leukocyte(cell) = &object.body
         && cell.form == NucleusForm::Lobed
     {
-        within("body.cell_um", cell.cell_um, [0.1, 100.0])?;
+        within("body.cytoplasm_diameter_um", cell.cytoplasm_diameter_um, [0.1, 100.0])?;
         within("body.lobes", cell.lobes as f64, [1.0, 16.0])?;
     }
     let most_um = MOST_REACHES * farthest_um;

@@ -1,27 +1,33 @@
 //! From recipe and key to a scene. No pixel is touched here.
 
-use crate::debris::ground::{CellPlace, Field, Sieve, Strewn};
+use std::collections::BTreeMap;
+
+use crate::debris::placement::{CellPosition, Field, PlacedObject, PlotDensity};
 use crate::debris::{Body, Debris};
 use crate::error::{Cause, Error};
 use crate::key::Key;
 use crate::model::Model;
 use crate::random;
 use crate::recipe::section::named;
-use crate::recipe::{Illumination, Light, Optics, Picture, Recipe};
+use crate::recipe::{Abundance, FocusOutput, Illumination, Light, Optics, Recipe};
 
-use super::cells::draw_cells;
+use super::cells::{Cells, Crowding, draw_cells};
 use super::field::{Object, Scene};
 use super::imaging::{Fusion, Restoration, SceneBackground, SceneIllumination, SceneLight, SceneOptics};
 use super::stain::FieldStain;
-use super::view::{FieldNumbers, View};
+use super::view::{FieldNumbers, Region, View};
 use super::weight::WeightMap;
+
+/// Number of draws of the objects of a field before cells that do not fit are left out.
+pub const MAX_ATTEMPTS: u32 = 8;
 
 /// Draws what lies on the slide and how it is imaged.
 ///
-/// `weight_map` is what the layout's `path` names, if it names a file.
+/// `weight_map` is what the layout's `path` names, if it names a file. If the cells do not fit, the objects are drawn again, up to
+/// [`MAX_ATTEMPTS`] times; then as many are placed as fit.
 ///
 /// # Errors
-/// If the layout has no room for the number of cells asked for.
+/// If no draw can succeed: the weight map is missing or too uneven, or there are more objects than labels can number.
 pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key: Key) -> Result<Scene, Error> {
     let field = FieldNumbers { key };
     let view = View {
@@ -31,54 +37,82 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
     };
     let fail = |cause| Error::Image { index: key.index, cause };
     let stain = FieldStain::draw(&recipe.stain, &field, slide_of(recipe, key));
-    let mut objects = draw_cells(recipe, model, weight_map, view, &field, &stain).map_err(fail)?;
-    strew(&recipe.debris, view, &field, &stain, None, &mut objects);
+    let draw_cells = |attempt: u32, crowding: Crowding| {
+        let numbers = FieldNumbers { key: key.attempt(attempt) };
+        let cells = draw_cells(recipe, model, weight_map, view, &numbers, &stain, crowding)?;
+        Ok((attempt, numbers, cells))
+    };
+    let is_crowded =
+        |cause: &Cause| matches!(cause, Cause::NoRoom { .. } | Cause::Crowded { .. } | Cause::TooUneven { .. });
+    let mut drawn = draw_cells(0, Crowding::Error);
+    for attempt in 1..MAX_ATTEMPTS {
+        if !drawn.as_ref().is_err_and(is_crowded) {
+            break;
+        }
+        let crowding = if attempt + 1 < MAX_ATTEMPTS { Crowding::Error } else { Crowding::LeaveOut };
+        drawn = draw_cells(attempt, crowding);
+    }
+    let (attempt, numbers, Cells { mut objects, field: inside, region, counts }) = drawn.map_err(fail)?;
+    strew(&recipe.debris, [inside, region], &numbers, &stain, None, &mut objects);
+    objects.retain(|object| {
+        let abundance = match &object.body {
+            Body::Cell(cell) => recipe.cells.get(&cell.class).map(|mix| &mix.count),
+            other => recipe.debris.abundance(other.kind()),
+        };
+        // Light of an object out of focus spreads by about its depth.
+        let reach_um = object.body.reach_um(view.pixel_um) + object.depth_um.abs();
+        !abundance.is_some_and(Abundance::is_density) || inside.touches(object.centre_um, reach_um)
+    });
     if u32::try_from(objects.len()).is_err() {
         return Err(fail(Cause::TooManyObjects(objects.len())));
     }
     for (id, object) in (1_u32..).zip(&mut objects) {
         object.id = id;
     }
-    Ok(Scene { objects, slide: slide_of(recipe, key), ..empty(recipe, view, &field, &stain) })
+    let slide = slide_of(recipe, key);
+    Ok(Scene { objects, slide, attempts: attempt + 1, cells: counts, ..empty(recipe, view, &field, &stain) })
 }
 
-/// Gives the cells of a field their coats, and adds everything that lies among them. `sieve` says what of it lies on a part
-/// of a slide.
+/// Gives the cells of a field their coats, and adds everything that lies among them, in the field or in the field with its
+/// margin. `sieve` says what of it lies on a part of a slide.
 pub(super) fn strew(
     debris: &Debris,
-    view: View,
+    [field, region]: [Region; 2],
     numbers: &FieldNumbers,
     stain: &FieldStain<'_>,
-    sieve: Option<Sieve<'_>>,
+    plot_density: Option<PlotDensity<'_>>,
     objects: &mut Vec<Object>,
 ) {
     debris.clue_cells.draw(numbers, objects.iter_mut().map(|cell| (cell.number, &mut cell.coat)));
     let place = |object: &Object| match &object.body {
         Body::Cell(body) => {
             let (centre_um, depth_um) = (object.centre_um, object.depth_um);
-            Some(CellPlace { centre_um, depth_um, radius_um: body.radius_um })
+            Some(CellPosition { centre_um, depth_um, radius_um: body.radius_um })
         }
         _ => None,
     };
-    let cells = objects.iter().filter_map(place).collect();
-    let strewn = debris.draw(&Field { view, numbers, stain, cells, sieve });
-    objects.extend(strewn.into_iter().map(|Strewn { number, cluster, lie, thing }| Object {
+    let is_inside = |cell: &CellPosition| field.touches(cell.centre_um, 0.0);
+    let (mut cells, outside): (Vec<_>, Vec<_>) = objects.iter().filter_map(place).partition(is_inside);
+    let inside = cells.len();
+    cells.extend(outside);
+    let placed = debris.draw(&Field { field, region, numbers, stain, cells, inside, plot_density });
+    objects.extend(placed.into_iter().map(|PlacedObject { number, cluster, placement, body }| Object {
         id: 0,
         number,
         cluster,
         plot: None,
-        centre_um: lie.centre_um,
-        depth_um: lie.depth_um,
-        rotation_deg: lie.rotation_deg,
+        centre_um: placement.centre_um,
+        depth_um: placement.depth_um,
+        rotation_deg: placement.rotation_deg,
         bethesda: String::new(),
         coat: None,
-        body: thing,
+        body,
     }));
 }
 
 /// The number of the slide that an image shows.
 fn slide_of(recipe: &Recipe, key: Key) -> u64 {
-    key.index / recipe.slide.fields.max(1) as u64
+    key.index / recipe.slide.fields_per_slide.max(1) as u64
 }
 
 /// The view without anything on it: how it is imaged.
@@ -100,6 +134,8 @@ pub(super) fn empty(recipe: &Recipe, view: View, field: &FieldNumbers, stain: &F
         dyes: stain.debris(),
         camera: recipe.camera.draw("camera", |path| field.stream(path)),
         frame: None,
+        attempts: 1,
+        cells: BTreeMap::new(),
         objects: Vec::new(),
     }
 }
@@ -117,7 +153,7 @@ pub(super) fn pixel_um(recipe: &Recipe, field: &FieldNumbers) -> f64 {
 fn planes(recipe: &Recipe, field: &FieldNumbers) -> (Vec<f64>, Option<Fusion>) {
     let focus = recipe.focus.draw("focus", |path| field.stream(path));
     let middle = f64::from(focus.planes - 1) / 2.0;
-    if focus.picture == Picture::Planes {
+    if focus.output == FocusOutput::Planes {
         let travel = |plane| focus.centre_um + (f64::from(plane) - middle) * focus.step_um;
         return ((0..focus.planes).map(travel).collect(), None);
     }
@@ -125,8 +161,8 @@ fn planes(recipe: &Recipe, field: &FieldNumbers) -> (Vec<f64>, Option<Fusion>) {
         first_um: focus.centre_um - middle * focus.step_um,
         step_um: focus.step_um,
         planes: focus.planes as usize,
-        noise_correlation: [focus.fused_noise_across, focus.fused_noise_down],
-        noise_skew: focus.fused_noise_skew,
+        noise_correlation: [focus.noise_correlation_x, focus.noise_correlation_y],
+        noise_skew: focus.noise_correlation_diagonal,
     };
     (vec![focus.centre_um], Some(fusion))
 }
@@ -163,20 +199,20 @@ fn background(recipe: &Recipe, field: &FieldNumbers) -> SceneBackground {
         Illumination::Border(border) => {
             SceneIllumination::Border { exponent: field.draw(named!("background.illumination", border.exponent)) }
         }
-        Illumination::Bowl(bowl) => {
-            let distance = field.draw(named!("background.illumination", bowl.off_centre));
+        Illumination::Quadratic(quadratic) => {
+            let distance = field.draw(named!("background.illumination", quadratic.centre_offset));
             let angle = random::direction(&mut field.stream("background.illumination.direction"));
-            SceneIllumination::Bowl {
-                x2: field.draw(named!("background.illumination", bowl.x2)),
-                y2: field.draw(named!("background.illumination", bowl.y2)),
-                top: [distance * libm::cos(angle), distance * libm::sin(angle)],
+            SceneIllumination::Quadratic {
+                falloff_x: field.draw(named!("background.illumination", quadratic.falloff_x)),
+                falloff_y: field.draw(named!("background.illumination", quadratic.falloff_y)),
+                centre: [distance * libm::cos(angle), distance * libm::sin(angle)],
             }
         }
     };
     SceneBackground {
         level: field.draw(named!(recipe.background.level)),
         illumination,
-        scatter: field.draw(named!(recipe.background.scatter)),
-        scatter_um: field.draw(named!(recipe.background.scatter_um)),
+        texture: field.draw(named!(recipe.background.texture)),
+        texture_um: field.draw(named!(recipe.background.texture_um)),
     }
 }

@@ -1,5 +1,7 @@
 //! One field of view: how it is imaged and what lies in it.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use super::imaging::{Fusion, Restoration, SceneBackground, SceneDyes, SceneLight, SceneOptics};
@@ -38,8 +40,32 @@ pub struct Scene {
     /// Which frame of a whole slide it is, if it is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frame: Option<SlideFrame>,
+    /// Number of times that the objects were drawn: more than 1 if the cells of the first draws did not fit.
+    #[serde(default = "one")]
+    pub attempts: u32,
+    /// Number of cells, by class.
+    #[serde(default)]
+    pub cells: BTreeMap<String, ClassCount>,
     /// Every object, by id.
     pub objects: Vec<Object>,
+}
+
+/// Number of cells of a class in a field.
+///
+/// Cells whose `count` is a density also lie in a margin of 60 µm round the field, from which they reach into the image.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClassCount {
+    /// Cells that the recipe requested, in the field and its margin.
+    pub requested: u64,
+    /// Cells placed there: fewer than requested if there was no room.
+    pub placed: u64,
+    /// Cells placed whose centre is in the field.
+    pub in_field: u64,
+}
+
+fn one() -> u32 {
+    1
 }
 
 /// A frame of a whole slide.
@@ -91,6 +117,12 @@ pub struct Object {
 }
 
 impl Scene {
+    /// Returns how many of the requested cells found no place.
+    #[must_use]
+    pub fn unplaced(&self) -> u64 {
+        self.cells.values().map(|count| count.requested.saturating_sub(count.placed)).sum()
+    }
+
     /// The grid on which the slide is rendered: that of the image, or a finer one.
     #[must_use]
     pub fn grid(&self) -> View {

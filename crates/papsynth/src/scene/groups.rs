@@ -73,7 +73,7 @@ impl<'a> Groups<'a> {
         mut free: impl FnMut(&mut Stream) -> Result<[f64; 2], E>,
         rng: &mut Stream,
     ) -> Result<Place, E> {
-        if self.group.form == GroupForm::Alone {
+        if self.group.form == GroupForm::Single {
             return Ok(Place { centre_um: free(rng)?, rotation_deg: f64::NAN, group: 0 });
         }
         let group = match self.now.take().filter(|group| group.cells.len() < group.size) {
@@ -96,7 +96,7 @@ impl<'a> Groups<'a> {
         let (centre_um, rotation_deg) = match self.group.form {
             GroupForm::Palisade => group.in_a_row(rng),
             GroupForm::Honeycomb => (group.in_a_layer(rng), random::between(0.0, 360.0, rng)),
-            GroupForm::Heap | GroupForm::Alone => (group.on_a_heap(rng), random::between(0.0, 360.0, rng)),
+            GroupForm::Aggregate | GroupForm::Single => (group.on_a_heap(rng), random::between(0.0, 360.0, rng)),
         };
         group.cells.push(centre_um);
         Ok(Place { centre_um, rotation_deg, group: self.begun })

@@ -41,9 +41,9 @@ pub struct SceneBackground {
     /// How evenly the lamp lights the field.
     pub illumination: SceneIllumination,
     /// Strength of the Perlin noise, fraction of full scale.
-    pub scatter: f64,
+    pub texture: f64,
     /// Size of its cells, µm.
-    pub scatter_um: f64,
+    pub texture_um: f64,
 }
 
 /// How evenly the lamp lights the field, its numbers drawn.
@@ -56,13 +56,13 @@ pub enum SceneIllumination {
         exponent: f64,
     },
     /// A smooth bowl.
-    Bowl {
+    Quadratic {
         /// Fall towards the left and right border.
-        x2: f64,
+        falloff_x: f64,
         /// Fall towards the upper and lower border.
-        y2: f64,
+        falloff_y: f64,
         /// Where its top lies, as a fraction of half the field.
-        top: [f64; 2],
+        centre: [f64; 2],
     },
 }
 
@@ -71,7 +71,9 @@ impl SceneIllumination {
     pub(crate) fn weakened(self, share: f64) -> Self {
         match self {
             Self::Border { exponent } => Self::Border { exponent: share * exponent },
-            Self::Bowl { x2, y2, top } => Self::Bowl { x2: share * x2, y2: share * y2, top },
+            Self::Quadratic { falloff_x, falloff_y, centre } => {
+                Self::Quadratic { falloff_x: share * falloff_x, falloff_y: share * falloff_y, centre }
+            }
         }
     }
 }

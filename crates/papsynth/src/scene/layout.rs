@@ -5,9 +5,9 @@ use rand_core::Rng;
 use crate::error::Cause;
 use crate::random;
 use crate::recipe::section::named;
-use crate::recipe::{Labels, Layout};
+use crate::recipe::{Clusters, Labels, Layout};
 
-use super::view::{FieldNumbers, View};
+use super::view::{FieldNumbers, Region, View};
 use super::weight::{Sampler, WeightMap};
 
 /// Size of a pixel of a weight map, µm: far below the size of a cell.
@@ -16,6 +16,9 @@ const PITCH_UM: f64 = 4.0;
 /// Largest number of pixels along a side of a weight map, for huge fields.
 const MOST_PIXELS: usize = 2048;
 
+/// Width of the margin of a field, µm: about the radius of the largest cells.
+pub(crate) const MARGIN_UM: f64 = 60.0;
+
 /// Most tries that a whole field may be expected to take.
 const MOST_TRIES: f64 = 1e9;
 
@@ -23,52 +26,124 @@ const MOST_TRIES: f64 = 1e9;
 /// random sequential adsorption jams at 0.547 (Feder 1980, doi:10.1016/0022-5193(80)90358-6).
 const JAMMED: f64 = 0.547;
 
-pub(super) fn weight_map(
+/// Weights of the places of a field, and of a margin round it.
+///
+/// Objects of a density also lie in the margin, so that as many reach into the image at its border as anywhere else.
+pub(super) struct Weights {
+    /// The field.
+    pub(super) field: Region,
+    /// The field and its margin.
+    pub(super) region: Region,
+    of_field: WeightMap,
+    of_region: WeightMap,
+    /// Area that a density is multiplied by, mm².
+    pub(super) populated_mm2: f64,
+}
+
+/// Draws the weights of a field.
+pub(super) fn weights(
     layout: &Layout,
     given: Option<&WeightMap>,
     view: View,
-    field: &FieldNumbers,
-) -> Result<WeightMap, Cause> {
-    let [width_um, height_um] = view.size_um();
-    let pixels = |length: f64| random::count((length / PITCH_UM).ceil()).clamp(1, MOST_PIXELS);
-    let (width, height) = (pixels(width_um), pixels(height_um));
-    let place = move |[x, y]: [f64; 2]| [x * width_um, y * height_um];
-    match layout {
-        Layout::Uniform {} => Ok(WeightMap { width: 1, weights: vec![1.0] }),
-        Layout::Clusters(layout) => {
-            let count = field.count(named!("layout", layout.count)).max(1);
-            let outside = field.draw(named!("layout", layout.outside));
-            let clusters: Vec<[f64; 3]> = (0..count as u64)
-                .map(|cluster| {
-                    let mut rng = field.key.stream("field", cluster, "layout.cluster");
-                    let radius = layout.radius_um.draw(&mut rng);
-                    [random::between(0.0, width_um, &mut rng), random::between(0.0, height_um, &mut rng), radius]
-                })
-                .collect();
-            let distances = nearest_of(&clusters, [width, height], [width_um, height_um]);
-            let weight = |square: &f64| (outside + (1.0 - outside) * libm::exp(-0.5 * square)) as f32;
-            Ok(WeightMap { width, weights: distances.iter().map(weight).collect() })
+    numbers: &FieldNumbers,
+) -> Result<Weights, Cause> {
+    let field = Region::of(view);
+    let pixels = field.size_um.map(|length| random::count((length / PITCH_UM).ceil()).clamp(1, MOST_PIXELS));
+    let pitch_um = [0, 1].map(|axis| field.size_um[axis] / pixels[axis] as f64);
+    let margin_px = pitch_um.map(|pitch| random::count((MARGIN_UM / pitch).ceil()));
+    let region = field.with_margin([0, 1].map(|axis| margin_px[axis] as f64 * pitch_um[axis]));
+    let size = [0, 1].map(|axis| pixels[axis] + 2 * margin_px[axis]);
+    // A map of the field itself says nothing about its margin.
+    let of_map = |map: WeightMap| {
+        let (of_field, of_region, populated_mm2) = (map.clone(), map, field.area_mm2());
+        Weights { field, region: field, of_field, of_region, populated_mm2 }
+    };
+    let (of_region, is_stationary) = match layout {
+        Layout::Uniform {} => {
+            let even = WeightMap { width: 1, weights: vec![1.0] };
+            return Ok(Weights {
+                field,
+                region,
+                of_field: even.clone(),
+                of_region: even,
+                populated_mm2: region.area_mm2(),
+            });
         }
-        Layout::Swath(layout) => {
-            let band = field.draw(named!("layout", layout.width_um));
-            let outside = field.draw(named!("layout", layout.outside));
-            let mut rng = field.key.stream("field", 0, "layout.swath");
+        Layout::Clusters(layout) => (cluster_map(layout, field, region, size, numbers), layout.count.is_density()),
+        Layout::Band(layout) => {
+            let band = numbers.draw(named!("layout", layout.width_um));
+            let outside = numbers.draw(named!("layout", layout.outside));
+            let mut rng = numbers.key.stream("field", 0, "layout.band");
             let angle = random::direction(&mut rng);
             let (nx, ny) = (libm::cos(angle), libm::sin(angle));
-            let through = place([random::between(0.25, 0.75, &mut rng), random::between(0.25, 0.75, &mut rng)]);
-            Ok(WeightMap::from_fn(width, height, |at| {
-                let [x, y] = place(at);
+            let through = field.at([random::between(0.25, 0.75, &mut rng), random::between(0.25, 0.75, &mut rng)]);
+            let map = WeightMap::from_fn(size[0], size[1], |at| {
+                let [x, y] = region.at(at);
                 let distance = ((x - through[0]) * nx + (y - through[1]) * ny) / band;
                 outside + (1.0 - outside) * libm::exp(-0.5 * distance * distance)
-            }))
+            });
+            (map, false)
         }
-        Layout::Map { path } => given.cloned().ok_or_else(|| not_given(path, "an image")),
+        Layout::DensityMap { path } => return given.cloned().ok_or_else(|| not_given(path, "an image")).map(of_map),
         Layout::Labels(layout) => {
             let map = given.ok_or_else(|| not_given(&layout.path, "a label image"))?;
-            let smooth = field.draw(named!("layout", layout.smooth_um));
-            smoothed(map, smooth * map.width as f64 / width_um)
+            let smooth = numbers.draw(named!("layout", layout.smooth_um));
+            return smoothed(map, smooth * map.width as f64 / field.size_um[0]).map(of_map);
         }
+    };
+    let of_field = cropped(&of_region, margin_px, pixels);
+    let sum = |map: &WeightMap| map.weights.iter().map(|w| f64::from(*w)).sum::<f64>();
+    let populated_mm2 = if is_stationary {
+        region.area_mm2()
+    } else {
+        // So that the mean density within the field is that of the recipe.
+        field.area_mm2() * sum(&of_region) / sum(&of_field).max(f64::MIN_POSITIVE)
+    };
+    Ok(Weights { field, region, of_field, of_region, populated_mm2 })
+}
+
+/// The weights of round clusters: of a density of clusters also those whose centres lie beyond the margin.
+fn cluster_map(
+    layout: &Clusters,
+    field: Region,
+    region: Region,
+    [width, height]: [usize; 2],
+    numbers: &FieldNumbers,
+) -> WeightMap {
+    /// Distance beyond the margin at which clusters still have centres, in their largest radius, and at most.
+    const RADII: f64 = 2.0;
+    const FARTHEST_UM: f64 = 500.0;
+    let area = if layout.count.is_density() {
+        region.with_margin([(RADII * layout.radius_um.bounds()[1]).min(FARTHEST_UM); 2])
+    } else {
+        field
+    };
+    let count = numbers.number_of(named!("layout", layout.count), area.area_mm2());
+    let outside = numbers.draw(named!("layout", layout.outside));
+    let clusters: Vec<[f64; 3]> = (0..count)
+        .map(|cluster| {
+            let mut rng = numbers.key.stream("field", cluster, "layout.cluster");
+            let radius = layout.radius_um.draw(&mut rng);
+            let [x, y] = area.at([random::uniform(&mut rng), random::uniform(&mut rng)]);
+            [x - region.low_um[0], y - region.low_um[1], radius]
+        })
+        .collect();
+    let distances = nearest_of(&clusters, [width, height], region.size_um);
+    let is_empty = distances.iter().all(|square| square.is_infinite());
+    // Where no cluster reaches, cells lie anywhere.
+    let outside = if is_empty { 1.0 } else { outside };
+    let weight = |square: &f64| (outside + (1.0 - outside) * libm::exp(-0.5 * square)) as f32;
+    WeightMap { width, weights: distances.iter().map(weight).collect() }
+}
+
+/// The part of a map that starts at a column and a row; even if all its weights are zero.
+fn cropped(map: &WeightMap, first: [usize; 2], size: [usize; 2]) -> WeightMap {
+    let rows = map.weights.chunks_exact(map.width).skip(first[1]).take(size[1]);
+    let weights: Vec<f32> = rows.flat_map(|row| &row[first[0]..first[0] + size[0]]).copied().collect();
+    if weights.iter().all(|weight| *weight <= 0.0) {
+        return WeightMap { width: 1, weights: vec![1.0] };
     }
+    WeightMap { width: size[0], weights }
 }
 
 /// The square of the distance of each pixel's middle to the nearest of some clusters, in radii of the cluster; infinite far from all.
@@ -101,7 +176,7 @@ fn nearest_of(clusters: &[[f64; 3]], [width, height]: [usize; 2], size_um: [f64;
 
 /// What is wrong with what a layout names, before anything is drawn.
 pub(crate) fn check_layout(layout: &Layout, given: Option<&WeightMap>) -> Result<(), Cause> {
-    let (Layout::Map { path } | Layout::Labels(Labels { path, .. })) = layout else { return Ok(()) };
+    let (Layout::DensityMap { path } | Layout::Labels(Labels { path, .. })) = layout else { return Ok(()) };
     let map = given.ok_or_else(|| not_given(path, "an image"))?;
     map.sampler().map(|_| ()).map_err(|cause| Cause::Map { path: path.clone(), cause: Box::new(cause) })
 }
@@ -119,8 +194,8 @@ fn smoothed(map: &WeightMap, sigma_px: f64) -> Result<WeightMap, Cause> {
 
 /// Places cells one after the other, none nearer to another than a given distance.
 pub(super) struct Places {
-    sampler: Sampler,
-    size_um: [f64; 2],
+    /// The field, and the field with its margin.
+    areas: [(Sampler, Region); 2],
     spacing_um: f64,
     taken: Vec<[f64; 2]>,
     /// Indices of `taken` by square of the field, squares as wide as the spacing.
@@ -128,33 +203,54 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// Prepares to place `count` cells, or says why they will not fit: before the search starts.
-    pub(super) fn new(map: &WeightMap, count: usize, spacing_um: f64, view: View) -> Result<Self, Cause> {
-        let sampler = map.sampler()?;
-        let size_um = view.size_um();
-        let area = size_um[0] * size_um[1] * sampler.possible_share();
-        let disc = core::f64::consts::FRAC_PI_4 * spacing_um * spacing_um;
-        // A cell at the edge of what is possible takes only part of its disc from it.
-        let margin = 1.0 + spacing_um / area.sqrt();
-        let room = JAMMED * area * margin * margin / disc;
-        if count > 1 && disc > 0.0 && count as f64 > room {
-            return Err(Cause::NoRoom { count, spacing_um, area_um2: area, room });
+    pub(super) fn new(weights: &Weights, spacing_um: f64) -> Result<Self, Cause> {
+        let areas = [(weights.of_field.sampler()?, weights.field), (weights.of_region.sampler()?, weights.region)];
+        Ok(Self { areas, spacing_um, taken: Vec::new(), squares: std::collections::BTreeMap::new() })
+    }
+
+    /// Returns about how many cells fit into the field, or into the field and its margin.
+    pub(super) fn room(&self, in_margin: bool) -> f64 {
+        let disc = core::f64::consts::FRAC_PI_4 * self.spacing_um * self.spacing_um;
+        let area = self.area_um2(in_margin);
+        // A cell at the edge of the possible places takes only part of its disc from them.
+        let margin = 1.0 + self.spacing_um / area.sqrt();
+        if disc > 0.0 { (JAMMED * area * margin * margin / disc).max(1.0) } else { f64::INFINITY }
+    }
+
+    /// Area where cells may lie, µm².
+    fn area_um2(&self, in_margin: bool) -> f64 {
+        let (sampler, region) = &self.areas[usize::from(in_margin)];
+        region.size_um[0] * region.size_um[1] * sampler.possible_share()
+    }
+
+    /// Checks whether `count` cells fit, before the search starts.
+    pub(super) fn check(&self, count: usize, in_margin: bool) -> Result<(), Cause> {
+        let room = self.room(in_margin);
+        if count as f64 > room {
+            let (spacing_um, area_um2) = (self.spacing_um, self.area_um2(in_margin));
+            return Err(Cause::NoRoom { count, spacing_um, area_um2, room });
         }
-        let tries = sampler.expected_tries() * count as f64;
+        Ok(())
+    }
+
+    /// Checks whether the search takes a bearable number of tries.
+    pub(super) fn check_tries(&self, count: usize, in_margin: bool) -> Result<(), Cause> {
+        let tries = self.areas[usize::from(in_margin)].0.expected_tries() * count as f64;
         if tries > MOST_TRIES {
             return Err(Cause::TooUneven { count, tries, most: MOST_TRIES });
         }
-        Ok(Self { sampler, size_um, spacing_um, taken: Vec::new(), squares: std::collections::BTreeMap::new() })
+        Ok(())
     }
 
-    /// The next place, µm.
-    pub(super) fn next<R: Rng + ?Sized>(&mut self, rng: &mut R) -> Result<[f64; 2], Cause> {
+    /// The next place, µm: in the field, or in the field and its margin.
+    pub(super) fn next<R: Rng + ?Sized>(&mut self, in_margin: bool, rng: &mut R) -> Result<[f64; 2], Cause> {
         /// Accepted candidates that may turn out too near to others before the search is given up.
         const CROWDED: usize = 20_000;
         let mut crowded = 0;
+        let (sampler, region) = &self.areas[usize::from(in_margin)];
         while crowded < CROWDED {
-            let Some([x, y]) = self.sampler.try_place(rng) else { continue };
-            let place = [x * self.size_um[0], y * self.size_um[1]];
+            let Some(place) = sampler.try_place(rng) else { continue };
+            let place = region.at(place);
             if self.is_free(place) {
                 let square = self.square(place);
                 self.squares.entry(square).or_default().push(self.taken.len());

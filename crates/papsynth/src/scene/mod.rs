@@ -24,10 +24,10 @@ pub use crate::debris::{
 pub use crate::recipe::camera::SceneCamera;
 pub use crate::recipe::imaging::SceneMicroscope;
 pub use cell::{CellBody, CellDetail, Fold, FoldForm, Halo, NucleusBody, Tint};
-pub use draw::draw;
-pub use field::{Object, Plot, Scene, SlideFrame};
+pub use draw::{MAX_ATTEMPTS, draw};
+pub use field::{ClassCount, Object, Plot, Scene, SlideFrame};
 pub use imaging::{Fusion, Restoration, SceneBackground, SceneDyes, SceneIllumination, SceneLight, SceneOptics};
-pub(crate) use layout::check_layout;
+pub(crate) use layout::{MARGIN_UM, check_layout};
 pub(crate) use plots::{BEYOND, PLOT_PX, Population};
 pub use view::View;
 pub use weight::WeightMap;

@@ -16,8 +16,8 @@ use super::draw::{empty, pixel_um, strew};
 use super::field::{Object, Plot, Scene};
 use super::groups::Groups;
 use super::stain::FieldStain;
-use super::view::{FieldNumbers, View};
-use crate::debris::ground::{Sieve, near};
+use super::view::{FieldNumbers, Region, View};
+use crate::debris::placement::{PlotDensity, near};
 use crate::error::Cause;
 use crate::key::Key;
 use crate::model::Model;
@@ -50,7 +50,7 @@ pub(crate) struct Population {
     share: f64,
     spacing_um: f64,
     deposit: Deposit,
-    scatter: Scatter,
+    places: Places,
     relief: Relief,
     sown: Memory,
     plots: Memory,
@@ -58,7 +58,7 @@ pub(crate) struct Population {
 
 /// Where the layout lets cells lie: anywhere, or in clusters.
 #[derive(Debug)]
-struct Scatter {
+struct Places {
     clusters: Option<ClusterLayout>,
     /// Weight of the places outside all clusters.
     outside: f64,
@@ -122,16 +122,16 @@ impl Population {
             share: (PLOT_PX * PLOT_PX) as f64 / field_px,
             spacing_um: slide.draw(named!(recipe.slide.spacing_um)),
             deposit: Deposit::draw(&recipe.scan.deposit, &slide),
-            scatter: Scatter { clusters: None, outside: 1.0, reach: 0, mean: 1.0 },
+            places: Places { clusters: None, outside: 1.0, reach: 0, mean: 1.0 },
             relief: Relief::new(
                 slide.draw(named!(recipe.slide.depth_um)),
-                slide.draw(named!(recipe.slide.relief_um)),
+                slide.draw(named!(recipe.slide.depth_scale_um)),
                 relief_key,
             ),
             sown: Memory::default(),
             plots: Memory::default(),
         };
-        population.scatter(&slide)?;
+        population.place_clusters(&slide)?;
         Ok((population, scene))
     }
 
@@ -144,8 +144,12 @@ impl Population {
         PLOT_PX as f64 * self.pixel_um
     }
 
+    fn plot_mm2(&self) -> f64 {
+        self.side_um() * self.side_um() * 1e-6
+    }
+
     /// How the layout lets cells lie on a slide.
-    fn scatter(&mut self, slide: &FieldNumbers) -> Result<(), Cause> {
+    fn place_clusters(&mut self, slide: &FieldNumbers) -> Result<(), Cause> {
         /// Most plots that a cluster may reach beyond its own.
         const FARTHEST: i64 = 4;
         /// Places, along a side, at which the mean weight is taken, and plots that they lie in.
@@ -162,7 +166,7 @@ impl Population {
             return Err(Cause::WideClusters(largest, FARTHEST as f64 * self.side_um() / CLUSTER_REACH));
         }
         let outside = slide.draw(named!("layout", layout.outside));
-        self.scatter = Scatter { clusters: Some(layout.clone()), outside, reach, mean: 1.0 };
+        self.places = Places { clusters: Some(layout.clone()), outside, reach, mean: 1.0 };
         // The mean over a part of the slide that does not depend on the slide's size.
         let mut sum = 0.0;
         for row in 0..ACROSS {
@@ -177,19 +181,19 @@ impl Population {
                 }
             }
         }
-        self.scatter.mean = sum / (PLACES * PLACES) as f64;
+        self.places.mean = sum / (PLACES * PLACES) as f64;
         Ok(())
     }
 
     /// The clusters that reach into a plot.
     fn clusters(&self, at: [i64; 2]) -> Vec<Cluster> {
-        let Scatter { clusters: Some(layout), reach, .. } = &self.scatter else { return Vec::new() };
+        let Places { clusters: Some(layout), reach, .. } = &self.places else { return Vec::new() };
         let mut clusters = Vec::new();
         for row in at[1] - reach..=at[1] + reach {
             for column in at[0] - reach..=at[0] + reach {
                 let field = FieldNumbers { key: self.key.plot(number([column, row])) };
                 let count = named!("layout", layout.count);
-                for cluster in 0..field.whole(count.0, field.draw(count) * self.share) {
+                for cluster in 0..field.number_on_slide(count, [self.plot_mm2(), self.share], 1.0) {
                     let mut rng = field.key.stream("field", cluster, "layout.cluster");
                     let radius = layout.radius_um.draw(&mut rng);
                     let place = [column, row].map(|at| (at as f64 + random::uniform(&mut rng)) * self.side_um());
@@ -206,7 +210,7 @@ impl Population {
         let slide = FieldNumbers { key: self.key };
         let stain = FieldStain::of_slide(&self.recipe.stain, &slide);
         let clusters = self.clusters(at);
-        let Scatter { outside, mean, .. } = self.scatter;
+        let Places { outside, mean, .. } = self.places;
         let side_um = self.side_um();
         let global = |place: [f64; 2]| [0, 1].map(|axis| place[axis] + at[axis] as f64 * side_um);
         let stays = |place: [f64; 2]| weight(&clusters, outside, place) * self.deposit.density(place) / DENSEST;
@@ -217,10 +221,10 @@ impl Population {
             // The engine was made with this model and recipe.
             let kind = Class { name, mix, class: &self.model.classes[name] };
             let path = format!("cells.{name}.count");
-            let alone = mix.group.form == GroupForm::Alone;
+            let alone = mix.group.form == GroupForm::Single;
             let size = if alone { 1.0 } else { mean_of(&mix.group.size) };
-            let wanted = field.draw((&path, &mix.count)) * self.share * DENSEST / mean / size;
-            for _ in 0..field.whole(&path, wanted) {
+            let factor = DENSEST / mean / size;
+            for _ in 0..field.number_on_slide((&path, &mix.count), [self.plot_mm2(), self.share], factor) {
                 let mut rng = field.key.stream("cell", tried, "origin");
                 let origin = [0, 1].map(|_| random::between(0.0, side_um, &mut rng));
                 let number = tried;
@@ -280,15 +284,14 @@ impl Population {
         objects.retain(|cell| {
             cell.cluster > 0 || !taken.iter().any(|other| near(*other, cell.centre_um, self.spacing_um))
         });
-        let (width, height) = (PLOT_PX as usize, PLOT_PX as usize);
-        let view = View { width, height, pixel_um: self.pixel_um };
+        let region = Region { low_um: [0.0; 2], size_um: [side_um; 2] };
         let stays = |place: [f64; 2]| {
             let place = [0, 1].map(|axis| place[axis] + at[axis] as f64 * side_um);
             self.deposit.density(place) / DENSEST
         };
         // Those that stay anywhere are tried as often as there are some, the others more often.
-        let sieve = Sieve { share: self.share, most: DENSEST, stays: &stays };
-        strew(&self.recipe.debris, view, &field, &stain, Some(sieve), &mut objects);
+        let plot_density = PlotDensity { area_in_fields: self.share, max_density: DENSEST, keep_probability: &stays };
+        strew(&self.recipe.debris, [region; 2], &field, &stain, Some(plot_density), &mut objects);
         let most = (1 << OBJECT_BITS) - 2;
         if objects.len() > most {
             return Err(Cause::FullPlot { side_px: PLOT_PX, found: objects.len(), most });
@@ -372,13 +375,21 @@ impl Deposit {
     fn density(&self, [x, y]: [f64; 2]) -> f64 {
         /// Standard deviation of the noise.
         const SPREAD: f64 = 0.27;
-        let SceneDeposit { x_um, y_um, radius_um, edge_um, unevenness, patch_um, outside } = self.drawn;
+        let SceneDeposit {
+            x_um,
+            y_um,
+            radius_um,
+            edge_um,
+            density_variation: sd,
+            density_scale_um,
+            outside_density: outside,
+        } = self.drawn;
         let (dx, dy) = (x - x_um, y - y_um);
         let inside = (radius_um - (dx * dx + dy * dy).sqrt()) / edge_um;
         let share = (0.5 + 0.5 * inside).clamp(0.0, 1.0);
         let share = share * share * (3.0 - 2.0 * share);
-        let noise = f64::from(self.patches.at(x / patch_um, y / patch_um)) / SPREAD;
-        let uneven = libm::exp(unevenness * (noise - 0.5 * unevenness)).min(DENSEST);
+        let noise = f64::from(self.patches.at(x / density_scale_um, y / density_scale_um)) / SPREAD;
+        let uneven = libm::exp(sd * (noise - 0.5 * sd)).min(DENSEST);
         uneven * (outside + (1.0 - outside) * share)
     }
 }

@@ -1,5 +1,5 @@
-//! Partially coherent bright field: what each object lets through, filtered by the microscope's transfer functions, and
-//! the product over all objects.
+//! Partially coherent bright field: the transmittance of each object, filtered by the transfer functions of the
+//! microscope, and the product over all objects.
 
 use core::ops::Range;
 use std::collections::BTreeMap;
@@ -12,9 +12,9 @@ use optics_psf::{
 };
 use portable_numerics::elementary::exp10_from;
 
-use super::canvas::{Canvas, Mixer, Window, add, clear};
-use super::light::{FocusAt, Light, Passage, Slide};
-use super::lights::{ColouredLight, Group, Lenses, groups};
+use super::channel_lights::{ChannelLight, LightGroup, MicroscopeCache, light_groups};
+use super::light::{FocusAt, LightBuffers, Specimen, TransmissionStats};
+use super::object_transmission::{DyeMixer, ObjectTransmission, Window, add, clear};
 use super::overlap::Overlaps;
 use crate::detect::sum_over;
 use crate::error::Cause;
@@ -25,165 +25,176 @@ use crate::scene::{SceneLight, SceneMicroscope, View};
 use crate::threads;
 use crate::truth::{COVERED, Mask, Run};
 
-/// Share of the further spread that lies beyond its ends and is left out.
+/// Fraction of the extra blur in its truncated tails.
 const LOST_TAIL: f64 = 1e-5;
 
-/// What all planes of one scene share.
+/// The bright-field optics of a scene.
 pub(crate) struct BrightFieldPath {
     optics: SceneMicroscope,
-    /// The further spread of finished light, if there is any.
-    pub(super) further: Option<Gaussian>,
+    /// Blur of the combined light, if any.
+    pub(super) extra_blur: Option<Gaussian>,
     restoration: Option<Gaussian>,
-    groups: Vec<Group>,
-    /// Where colours mix, if the light has any.
+    groups: Vec<LightGroup>,
+    /// Correction of overlapping colours, if the light is coloured.
     overlaps: Option<Overlaps>,
-    /// What each object lets through, where several planes share it.
-    kept: Option<Vec<Mutex<Option<Loaded>>>>,
-    spare: Mutex<Vec<Bench>>,
+    /// Patches of each object, if several planes use them.
+    cached_patches: Option<Vec<Mutex<Option<ObjectPatches>>>>,
+    free_buffers: Mutex<Vec<PatchBuffers>>,
 }
 
-/// What an object lets through, ready to be imaged at any focus.
+/// The transmittance of an object, transformed for imaging at any focus.
 #[derive(Debug, Default)]
-struct Loaded {
-    /// Light by light.
+struct ObjectPatches {
+    /// One patch per light.
     patches: Vec<Patch>,
-    /// The share of each grid point that is restored, if the object was taken from an image.
+    /// Restoration weight of each grid point, if the object has an imaged texture.
     restored: Vec<f32>,
 }
 
-/// Memory that one object leaves to the next.
+/// Buffers that are reused from object to object.
 #[derive(Debug, Default)]
-struct Bench {
-    canvas: Canvas,
-    loaded: Loaded,
+struct PatchBuffers {
+    transmission: ObjectTransmission,
+    object_patches: ObjectPatches,
     scratch: PatchScratch,
     factors: Vec<Factor>,
-    again: Factor,
+    refocused: Factor,
 }
 
-/// What an object lets through of a group's lights, in a plane.
-struct Passed {
-    bench: Bench,
+/// The images of an object in the lights of a group, in one plane.
+struct ObjectFactors {
+    buffers: PatchBuffers,
     window: Window,
-    /// Mean absorbance over the masks of its pieces, light by light.
+    /// For each light, the mean absorbance over the mask of each piece.
     absorbances: Vec<Vec<f64>>,
 }
 
 impl BrightFieldPath {
-    pub(super) fn new(slide: Slide<'_>, optics: &SceneMicroscope, lenses: &Lenses) -> Result<Self, Cause> {
-        let scene = slide.scene;
-        let groups = groups(slide, optics, lenses)?;
-        let further = || Gaussian::truncated(optics.extra_blur_um / scene.view.pixel_um, Method::Direct, LOST_TAIL);
-        let further = (optics.extra_blur_um > 0.0).then(further).transpose();
-        let further = further.map_err(|error| Cause::Optics("optics.extra_blur_um", error))?;
-        let imaged = slide.phantoms.iter().flat_map(|phantom| &phantom.pieces).any(|piece| piece.imaged);
+    pub(super) fn new(
+        specimen: Specimen<'_>,
+        optics: &SceneMicroscope,
+        microscopes: &MicroscopeCache,
+    ) -> Result<Self, Cause> {
+        let scene = specimen.scene;
+        let groups = light_groups(specimen, optics, microscopes)?;
+        let extra_blur = || Gaussian::truncated(optics.extra_blur_um / scene.view.pixel_um, Method::Direct, LOST_TAIL);
+        let extra_blur = (optics.extra_blur_um > 0.0).then(extra_blur).transpose();
+        let extra_blur = extra_blur.map_err(|error| Cause::Optics("optics.extra_blur_um", error))?;
+        let imaged = specimen.phantoms.iter().flat_map(|phantom| &phantom.pieces).any(|piece| piece.imaged);
         let restores = scene.restoration.restore != Restore::Off && imaged;
         let feather = || Gaussian::new(scene.restoration.feather_um / scene.grid().pixel_um);
         let restoration = restores.then(feather).transpose()?;
         Ok(Self {
             optics: *optics,
-            further,
+            extra_blur,
             restoration,
-            // Light of many single wavelengths would need too much memory.
-            kept: (scene.planes_um.len() > 1 && groups.len() == 1)
-                .then(|| slide.phantoms.iter().map(|_| Mutex::default()).collect()),
+            // Patches of many single wavelengths would need too much memory.
+            cached_patches: (scene.planes_um.len() > 1 && groups.len() == 1)
+                .then(|| specimen.phantoms.iter().map(|_| Mutex::default()).collect()),
             overlaps: matches!(scene.light, SceneLight::Colour { mixing: Mixing::Spectral, .. })
-                .then(|| Overlaps::new(slide)),
+                .then(|| Overlaps::new(specimen)),
             groups,
-            spare: Mutex::default(),
+            free_buffers: Mutex::default(),
         })
     }
 
-    /// The channels of `light` become what the objects let through.
-    pub(super) fn pass(&self, slide: Slide<'_>, focus: FocusAt, light: &mut Light) -> Result<Passage, Cause> {
-        let View { width, height, .. } = slide.scene.view;
-        let Light { channels, lights, pictures, .. } = light;
-        let mut passage = Passage { absorbances: vec![Vec::new(); channels.len()], floored: 0 };
+    /// Computes the transmitted fraction in the channels of `light`.
+    pub(super) fn transmit(
+        &self,
+        specimen: Specimen<'_>,
+        focus: FocusAt,
+        light: &mut LightBuffers,
+    ) -> Result<TransmissionStats, Cause> {
+        let View { width, height, .. } = specimen.scene.view;
+        let LightBuffers { channels, lights, images, .. } = light;
+        let mut stats = TransmissionStats { absorbances: vec![Vec::new(); channels.len()], clipped_px: 0 };
         for group in &self.groups {
-            lights.resize_with(group.lights.len(), optics_psf::Light::default);
-            pictures.resize(group.lights.len(), Vec::new());
+            lights.resize_with(group.lights.len(), optics_psf::TransmittedLight::default);
+            images.resize(group.lights.len(), Vec::new());
             for (light, of) in lights.iter_mut().zip(&group.lights) {
                 light.reset(of.imager.microscope(), width, height);
             }
-            let absorbances = self.pass_group(slide, focus, group, lights, &mut passage.floored)?;
+            let absorbances = self.transmit_group(specimen, focus, group, lights, &mut stats.clipped_px)?;
             let exact = self.optics.imaging == Imaging::Abbe;
             if let (true, FocusAt::Stage(stage_um)) = (exact, focus) {
-                // Light that was carried from slab to slab takes the place of products.
-                passage.floored = 0;
+                // The multislice image replaces the product.
+                stats.clipped_px = 0;
                 let indices: Vec<usize> = (0..lights.len()).collect();
-                let images = threads::map(slide.threads, &indices, |&light| {
-                    let ColouredLight { imager, shift_um, .. } = &group.lights[light];
-                    abbe_image(slide, &self.optics, imager.microscope(), (&group.mixer, light), stage_um - shift_um)
+                let images = threads::map(specimen.threads, &indices, |&light| {
+                    let ChannelLight { imager, shift_um, .. } = &group.lights[light];
+                    abbe_image(specimen, &self.optics, imager.microscope(), (&group.mixer, light), stage_um - shift_um)
                 });
                 for (light, image) in lights.iter_mut().zip(images) {
                     light.clear();
                     light.multiply(&image?, [0, 0]);
                 }
             }
-            for (light, picture) in lights.iter().zip(pictures.iter_mut()) {
-                picture.resize(width * height, 0.0);
-                light.picture_into(picture);
+            for (light, image) in lights.iter().zip(images.iter_mut()) {
+                image.resize(width * height, 0.0);
+                light.image_into(image);
             }
-            if let (false, Some(overlaps), Mixer::Colour(colour)) = (exact, &self.overlaps, &group.mixer) {
-                let blur_px = |index: usize| self.blur_px(slide, index, focus, group);
-                overlaps.correct(colour, slide, blur_px, pictures)?;
+            if let (false, Some(overlaps), DyeMixer::Colour(colour)) = (exact, &self.overlaps, &group.mixer) {
+                let blur_px = |index: usize| self.blur_px(specimen, index, focus, group);
+                overlaps.correct(colour, specimen, blur_px, images)?;
             }
-            for ((of, picture), absorbances) in group.lights.iter().zip(&*pictures).zip(&absorbances) {
+            for ((of, image), absorbances) in group.lights.iter().zip(&*images).zip(&absorbances) {
                 for (channel, &weight) in of.weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
-                    add_light(&mut channels[channel], picture, weight as f32);
-                    let sums = &mut passage.absorbances[channel];
+                    add_light(&mut channels[channel], image, weight as f32);
+                    let sums = &mut stats.absorbances[channel];
                     sums.resize(absorbances.len(), 0.0);
                     sums.iter_mut().zip(absorbances).for_each(|(sum, value)| *sum += weight * value);
                 }
             }
         }
-        Ok(passage)
+        Ok(stats)
     }
 
-    /// How widely an object is blurred in a plane, as the standard deviation of its cone of light, px.
-    fn blur_px(&self, slide: Slide<'_>, index: usize, focus: FocusAt, group: &Group) -> f64 {
+    /// Returns the blur of an object in a plane as the standard deviation of its cone of light, px.
+    fn blur_px(&self, specimen: Specimen<'_>, index: usize, focus: FocusAt, group: &LightGroup) -> f64 {
         let (FocusAt::Stage(plane_um), [.., light]) = (focus, &group.lights[..]) else { return 0.0 };
-        let stage_um = slide.scene.seen_at_um(plane_um, slide.scene.objects[index].depth_um);
+        let stage_um = specimen.scene.seen_at_um(plane_um, specimen.scene.objects[index].depth_um);
         let microscope = light.imager.microscope();
         // An even disc of radius r has a standard deviation of r/2 along each axis.
-        microscope.cone_radius_um(slide.scene.objects[index].depth_um, stage_um) / (2.0 * slide.scene.view.pixel_um)
+        microscope.cone_radius_um(specimen.scene.objects[index].depth_um, stage_um)
+            / (2.0 * specimen.scene.view.pixel_um)
     }
 
-    /// Multiplies the lights of a group by what the objects let through, on either grid. Gives the mean absorbances over the
-    /// masks of all pieces, light by light.
-    fn pass_group(
+    /// Multiplies the lights of a group by the images of all objects.
+    ///
+    /// Returns, for each light, the mean absorbance over the mask of each piece.
+    fn transmit_group(
         &self,
-        slide: Slide<'_>,
+        specimen: Specimen<'_>,
         focus: FocusAt,
-        group: &Group,
-        lights: &mut [optics_psf::Light],
-        floored: &mut usize,
+        group: &LightGroup,
+        lights: &mut [optics_psf::TransmittedLight],
+        clipped_px: &mut usize,
     ) -> Result<Vec<Vec<f64>>, Cause> {
         let mut absorbances = vec![Vec::new(); lights.len()];
-        let image = |index: usize| self.image(slide, index, focus, group);
-        threads::each(slide.threads, slide.phantoms.len(), image, |index, passed: Result<_, Cause>| {
-            let Some(passed) = passed? else {
+        let image = |index: usize| self.image_object(specimen, index, focus, group);
+        threads::each(specimen.threads, specimen.phantoms.len(), image, |index, object_factors: Result<_, Cause>| {
+            let Some(object_factors) = object_factors? else {
                 for absorbances in &mut absorbances {
-                    absorbances.extend(slide.phantoms[index].pieces.iter().map(|_| 0.0));
+                    absorbances.extend(specimen.phantoms[index].pieces.iter().map(|_| 0.0));
                 }
                 return Ok(());
             };
-            let at_px = passed.window.origin.map(|at| at / i64::from(self.optics.oversampling));
-            let factors = passed.bench.factors.iter().zip(&passed.absorbances);
+            let at_px = object_factors.window.origin.map(|at| at / i64::from(self.optics.oversampling));
+            let factors = object_factors.buffers.factors.iter().zip(&object_factors.absorbances);
             for ((light, absorbances), (factor, own)) in lights.iter_mut().zip(&mut absorbances).zip(factors) {
                 light.multiply(factor, at_px);
-                *floored += factor.floored;
+                *clipped_px += factor.clipped;
                 absorbances.extend(own);
             }
-            self.spare().push(passed.bench);
+            self.free_buffers().push(object_factors.buffers);
             Ok::<_, Cause>(())
         })?;
         Ok(absorbances)
     }
 
-    /// Makes of what objects let through light, in some rows: B·(s + (1 − s)·∏), s the stray light.
-    pub(super) fn illuminate(&self, light: &mut Light, rows: Range<usize>) {
-        let Light { empty_log10, channels, empty, .. } = light;
+    /// Converts transmitted fractions to light in some rows: B·(s + (1 − s)·∏), where s is the stray light.
+    pub(super) fn illuminate(&self, light: &mut LightBuffers, rows: Range<usize>) {
+        let LightBuffers { empty_log10, channels, empty, .. } = light;
         clear(empty, rows.len());
         exp10_from(&empty_log10[rows.clone()], empty);
         for channel in channels {
@@ -191,7 +202,7 @@ impl BrightFieldPath {
         }
     }
 
-    /// Pixels by which an object of that depth is spread where the stage stands.
+    /// Returns the blur radius of an object at this depth and stage position, in pixels.
     pub(super) fn reach_px(&self, depth_um: f64, stage_um: f64) -> Result<usize, Cause> {
         let mut widest = 0;
         for light in self.groups.iter().flat_map(|group| &group.lights) {
@@ -200,19 +211,25 @@ impl BrightFieldPath {
         Ok(widest)
     }
 
-    /// Images an object; nothing if none of its light reaches the picture.
-    fn image(&self, slide: Slide<'_>, index: usize, at: FocusAt, group: &Group) -> Result<Option<Passed>, Cause> {
-        let (object, phantom) = (&slide.scene.objects[index], &slide.phantoms[index]);
-        // How deep it lies and how far the stage has travelled.
-        let place = |light: &ColouredLight| match at {
+    /// Images an object. Returns `None` if it does not affect the image.
+    fn image_object(
+        &self,
+        specimen: Specimen<'_>,
+        index: usize,
+        at: FocusAt,
+        group: &LightGroup,
+    ) -> Result<Option<ObjectFactors>, Cause> {
+        let (object, phantom) = (&specimen.scene.objects[index], &specimen.phantoms[index]);
+        // Depth and stage position.
+        let position = |light: &ChannelLight| match at {
             FocusAt::Everywhere => (0.0, 0.0),
             FocusAt::Stage(plane_um) => {
                 let depth_um = object.depth_um;
-                (depth_um, slide.scene.seen_at_um(plane_um, depth_um) - light.shift_um)
+                (depth_um, specimen.scene.seen_at_um(plane_um, depth_um) - light.shift_um)
             }
         };
-        let of_light = |light: &ColouredLight| {
-            let (depth_um, stage_um) = place(light);
+        let of_light = |light: &ChannelLight| {
+            let (depth_um, stage_um) = position(light);
             light.imager.focus(depth_um, stage_um)
         };
         let focuses = group.lights.iter().map(of_light).collect::<Result<Vec<Focus>, _>>()?;
@@ -221,121 +238,140 @@ impl BrightFieldPath {
             return Ok(None);
         };
         let margin_px = focuses.iter().map(Focus::margin_px).max().unwrap_or(0);
-        let grid = slide.scene.grid();
+        let grid = specimen.scene.grid();
         if !window.meets(grid.width, grid.height, margin_px * n) {
             return Ok(None);
         }
-        let mut bench = self.spare().pop().unwrap_or_default();
-        let Bench { canvas, loaded, scratch, factors, again } = &mut bench;
-        let mut kept = self.kept.as_ref().map(|kept| kept[index].lock().unwrap_or_else(PoisonError::into_inner));
-        let loaded = match &mut kept {
-            Some(kept) => kept.get_or_insert_with(|| {
-                let mut fresh = Loaded::default();
-                self.load(phantom, group, window, canvas, &mut fresh);
+        let mut buffers = self.free_buffers().pop().unwrap_or_default();
+        let PatchBuffers { transmission, object_patches, scratch, factors, refocused } = &mut buffers;
+        let mut cached_patches = self
+            .cached_patches
+            .as_ref()
+            .map(|cached_patches| cached_patches[index].lock().unwrap_or_else(PoisonError::into_inner));
+        let object_patches = match &mut cached_patches {
+            Some(cached_patches) => cached_patches.get_or_insert_with(|| {
+                let mut fresh = ObjectPatches::default();
+                self.fill_patches(phantom, group, window, transmission, &mut fresh);
                 fresh
             }),
             None => {
-                self.load(phantom, group, window, canvas, loaded);
-                loaded
+                self.fill_patches(phantom, group, window, transmission, object_patches);
+                object_patches
             }
         };
         factors.resize_with(group.lights.len(), Factor::default);
-        let lights = group.lights.iter().zip(&mut loaded.patches);
+        let lights = group.lights.iter().zip(&mut object_patches.patches);
         for (factor, (focus, (light, patch))) in factors.iter_mut().zip(focuses.iter().zip(lights)) {
             let imager = &light.imager;
             imager.expose(patch, focus, scratch, factor);
-            if !loaded.restored.is_empty() {
-                let (depth_um, stage_um) = place(light);
+            if !object_patches.restored.is_empty() {
+                let (depth_um, stage_um) = position(light);
                 let focus = imager.refocus(depth_um, stage_um)?;
-                imager.expose(patch, &focus, scratch, again);
-                restore(factor, again, &loaded.restored, window, n);
+                imager.expose(patch, &focus, scratch, refocused);
+                restore(factor, refocused, &object_patches.restored, window, n);
             }
         }
-        drop(kept);
+        drop(cached_patches);
         let absorbances = factors.iter().enumerate().map(|(light, factor)| {
-            let of_piece = |(piece, share): (&Piece, &f64)| share * mean_absorbance(&piece.mask, factor, window, n);
-            phantom.pieces.iter().zip(&group.shares[index][light]).map(of_piece).collect()
+            let of_piece =
+                |(piece, fraction): (&Piece, &f64)| fraction * mean_absorbance(&piece.mask, factor, window, n);
+            phantom.pieces.iter().zip(&group.fractions[index][light]).map(of_piece).collect()
         });
         let absorbances = absorbances.collect();
-        Ok(Some(Passed { bench, window, absorbances }))
+        Ok(Some(ObjectFactors { buffers, window, absorbances }))
     }
 
-    fn load(&self, phantom: &Phantom, group: &Group, window: Window, canvas: &mut Canvas, loaded: &mut Loaded) {
-        group.mixer.compose(&phantom.pieces, window, canvas);
-        loaded.patches.resize_with(group.lights.len(), Patch::default);
-        let lights = group.lights.iter().zip(&canvas.transmittance);
-        for ((light, transmittance), patch) in lights.zip(&mut loaded.patches) {
-            light.imager.load(transmittance, &canvas.phase_rad, window.width, patch);
+    fn fill_patches(
+        &self,
+        phantom: &Phantom,
+        group: &LightGroup,
+        window: Window,
+        transmission: &mut ObjectTransmission,
+        object_patches: &mut ObjectPatches,
+    ) {
+        group.mixer.compose(&phantom.pieces, window, transmission);
+        object_patches.patches.resize_with(group.lights.len(), Patch::default);
+        let lights = group.lights.iter().zip(&transmission.transmittance);
+        for ((light, transmittance), patch) in lights.zip(&mut object_patches.patches) {
+            light.imager.load(transmittance, &transmission.phase_rad, window.width, patch);
         }
-        loaded.restored.clear();
+        object_patches.restored.clear();
         let imaged = phantom.pieces.iter().filter(|piece| piece.imaged);
         if let (Some(feather), true) = (&self.restoration, imaged.clone().count() > 0) {
             let mut mask = vec![0.0; window.width * window.height];
             for piece in imaged {
-                add(&mut mask, window, &binary(&piece.coverage).repeated(piece.cover_step), 1.0);
+                add(&mut mask, window, &binary(&piece.coverage).repeated(piece.coverage_step), 1.0);
             }
             // Eq. 16: C′ = C ∗ G_σ.
-            loaded.restored = feather.blur(&mask, window.width, Border::Zero);
+            object_patches.restored = feather.blur(&mask, window.width, Border::Zero);
         }
     }
 
-    fn spare(&self) -> MutexGuard<'_, Vec<Bench>> {
-        self.spare.lock().unwrap_or_else(PoisonError::into_inner)
+    fn free_buffers(&self) -> MutexGuard<'_, Vec<PatchBuffers>> {
+        self.free_buffers.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// How widely light spreads beyond the condenser's cone, µm.
+/// Margin for diffraction beyond the cone of the condenser, µm.
 const DIFFRACTION_UM: f64 = 3.0;
 
-/// The accurate way: Abbe's integration over the source, light carried from slab to slab. The slide in one of a mixer's lights, where the stage stands: a factor that covers the picture.
+/// Images the complete specimen in one light by Abbe's integration over the source with multislice propagation.
+///
+/// Returns a factor that covers the image. This is the accurate and slow model.
 fn abbe_image(
-    slide: Slide<'_>,
+    specimen: Specimen<'_>,
     optics: &SceneMicroscope,
     microscope: &Microscope,
-    light: (&Mixer, usize),
+    light: (&DyeMixer, usize),
     stage_um: f64,
 ) -> Result<Factor, Cause> {
-    let View { width, height, pixel_um } = slide.scene.grid();
-    // Light that leaves on one side comes back on the other: so far apart that it does not reach the picture.
-    let margin = crate::random::count(((reach_um(slide, microscope, stage_um) + DIFFRACTION_UM) / pixel_um).ceil());
+    let View { width, height, pixel_um } = specimen.scene.grid();
+    // The grid is periodic: with this margin, light that wraps around does not reach the image.
+    let margin = crate::random::count(((reach_um(specimen, microscope, stage_um) + DIFFRACTION_UM) / pixel_um).ceil());
     let size = [width, height].map(|side| fast_length(side + 2 * margin));
     let frame = Window { origin: [-(margin as i64); 2], width: size[0], height: size[1] };
     let params =
         AbbeParams { width: size[0], height: size[1], source: Source::Vogel { points: optics.directions as usize } };
     let abbe = Abbe::new(microscope, &params).map_err(|error| Cause::Optics("optics.directions", error))?;
-    let layers = layers(slide, optics.slab_um, light, frame)?;
-    let whole = abbe.image(&layers, stage_um)?;
-    let rows = whole.chunks_exact(size[0]).skip(margin).take(height);
+    let layers = layers(specimen, optics.slab_um, light, frame)?;
+    let full = abbe.image(&layers, stage_um)?;
+    let rows = full.chunks_exact(size[0]).skip(margin).take(height);
     let values = rows.flat_map(|row| row[margin..margin + width].iter().map(|light| *light as f32)).collect();
-    Ok(Factor { lattice: Lattice::Object, width, values, margin_px: 0, floored: 0 })
+    Ok(Factor { lattice: Lattice::Object, width, values, margin_px: 0, clipped: 0 })
 }
 
-/// The widest cone of light of all objects, µm.
-fn reach_um(slide: Slide<'_>, microscope: &Microscope, stage_um: f64) -> f64 {
-    let depths = slide.scene.objects.iter().map(|object| object.depth_um);
+/// Returns the radius of the widest cone of light of all objects, µm.
+fn reach_um(specimen: Specimen<'_>, microscope: &Microscope, stage_um: f64) -> f64 {
+    let depths = specimen.scene.objects.iter().map(|object| object.depth_um);
     depths.map(|depth_um| microscope.cone_radius_um(depth_um, stage_um)).fold(0.0, f64::max)
 }
 
-/// Every slab that is not empty, as amplitudes.
-fn layers(slide: Slide<'_>, slab_um: f64, (mixer, light): (&Mixer, usize), frame: Window) -> Result<Vec<Layer>, Cause> {
+/// Returns the complex amplitude transmittance of every slab that contains objects.
+fn layers(
+    specimen: Specimen<'_>,
+    slab_um: f64,
+    (mixer, light): (&DyeMixer, usize),
+    frame: Window,
+) -> Result<Vec<Layer>, Cause> {
     let mut slabs: BTreeMap<i64, Vec<[f64; 2]>> = BTreeMap::new();
-    let mut canvas = Canvas::default();
-    for (object, phantom) in slide.scene.objects.iter().zip(slide.phantoms) {
+    let mut transmission = ObjectTransmission::default();
+    for (object, phantom) in specimen.scene.objects.iter().zip(specimen.phantoms) {
         let tiles = phantom.pieces.iter().map(|piece| &piece.absorbance);
         let Some(window) = Window::around(tiles, 1) else { continue };
-        mixer.compose(&phantom.pieces, window, &mut canvas);
+        mixer.compose(&phantom.pieces, window, &mut transmission);
         let slab = libm::round(object.depth_um / slab_um) as i64;
         let amplitudes = slabs.entry(slab).or_insert_with(|| vec![[1.0, 0.0]; frame.width * frame.height]);
-        let transmittance = canvas.transmittance[light].chunks_exact(window.width);
+        let transmittance = transmission.transmittance[light].chunks_exact(window.width);
         for (y, row) in transmittance.enumerate() {
-            let place = |axis: usize, at: usize| usize::try_from(window.origin[axis] + at as i64 - frame.origin[axis]);
-            let Ok(to_y) = place(1, y) else { continue };
+            let position =
+                |axis: usize, at: usize| usize::try_from(window.origin[axis] + at as i64 - frame.origin[axis]);
+            let Ok(to_y) = position(1, y) else { continue };
             for (x, light) in row.iter().enumerate() {
-                let Ok(to_x) = place(0, x) else { continue };
+                let Ok(to_x) = position(0, x) else { continue };
                 if to_x >= frame.width || to_y >= frame.height {
                     continue;
                 }
-                let phase = canvas.phase_rad.get(y * window.width + x).map_or(0.0, |phase| f64::from(*phase));
+                let phase = transmission.phase_rad.get(y * window.width + x).map_or(0.0, |phase| f64::from(*phase));
                 let amplitude = f64::from(*light).max(0.0).sqrt();
                 let [re, im] = [amplitude * libm::cos(phase), amplitude * libm::sin(phase)];
                 let at = &mut amplitudes[to_y * frame.width + to_x];
@@ -347,23 +383,23 @@ fn layers(slide: Slide<'_>, slab_um: f64, (mixer, light): (&Mixer, usize), frame
     slabs.into_iter().map(layer).collect()
 }
 
-/// 1 where a tile is covered, 0 elsewhere.
+/// Returns 1 where coverage reaches the mask threshold and 0 elsewhere.
 fn binary(coverage: &Tile) -> Tile {
-    let values = coverage.values.iter().map(|share| if *share >= COVERED { 1.0 } else { 0.0 }).collect();
+    let values = coverage.values.iter().map(|coverage| if *coverage >= COVERED { 1.0 } else { 0.0 }).collect();
     Tile { values, ..coverage.clone() }
 }
 
-/// Eq. 15 on one object: I′ = I_again · C′ + I · (1 − C′). Both factors are those of one patch at one focus.
-fn restore(factor: &mut Factor, again: &Factor, shares: &[f32], window: Window, n: usize) {
+/// Applies Eq. 15 to one object: I′ = I_refocused · C′ + I · (1 − C′). Both factors are of one patch at one focus.
+fn restore(factor: &mut Factor, refocused: &Factor, weights: &[f32], window: Window, n: usize) {
     let (step, margin) = match factor.lattice {
         Lattice::Object => (1, factor.margin_px * n),
         Lattice::Camera => (n, factor.margin_px),
     };
-    for (y, shares) in shares.chunks_exact(window.width * step).enumerate() {
+    for (y, weights) in weights.chunks_exact(window.width * step).enumerate() {
         let at = (y + margin) * factor.width + margin;
-        let values = factor.values[at..].iter_mut().zip(&again.values[at..]);
-        for ((old, new), share) in values.zip(shares[..window.width].iter().step_by(step)) {
-            *old += share * (new - *old);
+        let values = factor.values[at..].iter_mut().zip(&refocused.values[at..]);
+        for ((old, new), weight) in values.zip(weights[..window.width].iter().step_by(step)) {
+            *old += weight * (new - *old);
         }
     }
 }
@@ -378,7 +414,8 @@ fn illuminate(light: &mut [f32], empty: &[f32], stray: f32) {
     light.iter_mut().zip(empty).for_each(|(light, empty)| *light = empty * (stray + (1.0 - stray) * *light));
 }
 
-/// Absorbance of the mean light over a mask, of the factor of a patch that was made on a grid of `n` points a pixel's side.
+/// Returns the absorbance that corresponds to the mean of a factor over a mask, for a grid of `n` points per pixel and
+/// axis.
 fn mean_absorbance(mask: &Mask, factor: &Factor, window: Window, n: usize) -> f64 {
     let (n, origin) = match factor.lattice {
         Lattice::Object => (n, window.origin),

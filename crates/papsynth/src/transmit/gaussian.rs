@@ -1,12 +1,12 @@
-//! The paper's way: absorbances blurred by depth, added, and the light spread in the image plane (Eqs. 11–14).
+//! The paper's model: absorbances blurred by depth and added, and the light blurred in the image plane (Eqs. 11–14).
 
 use std::borrow::Cow;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use optics_psf::{Gaussian, Method, Scratch};
 
-use super::canvas::{Window, add, blurred};
-use super::light::{FocusAt, Light, Passage, Slide};
+use super::light::{FocusAt, LightBuffers, Specimen, TransmissionStats};
+use super::object_transmission::{Window, add, blurred_tile};
 use crate::detect::sum_over;
 use crate::error::Cause;
 use crate::phantom::piece::Piece;
@@ -14,86 +14,91 @@ use crate::phantom::tile::Tile;
 use crate::scene::SceneLight;
 use crate::threads;
 
-/// Spread below which a Gaussian changes nothing that 16 bits could show, px.
+/// Standard deviation below which a Gaussian changes nothing visible in 16 bits, px.
 const SHARP_PX: f64 = 0.03;
 
-/// Share of an object's absorbance that lies beyond the ends of its blur and is left out. It errs by ten times
-/// that at the worst, which is what the decimated blur may err by.
+/// Fraction of an object's absorbance in the truncated tails of its blur. The largest error is ten times this value,
+/// which is the tolerance of the decimated blur.
 const LOST_TAIL: f64 = 1e-4;
 
-/// The same for the spread in the image plane, which everything passes.
+/// The same for the blur in the image plane, which affects all light.
 const LOST_TAIL_IN_PLANE: f64 = 1e-5;
 
-/// What all planes of one scene share.
+/// The Gaussian optics of a scene.
 pub(crate) struct GaussianPath {
     frame: Window,
     pub(super) in_plane: Gaussian,
-    /// Growth of the spread with distance from focus, px per µm.
+    /// Growth of the standard deviation with defocus, px per µm.
     px_per_um: f64,
     /// Wavelength of the light, µm.
     wavelength_um: f64,
-    spare: Mutex<Spare>,
+    free_buffers: Mutex<SpareBuffers>,
 }
 
-/// Memory for blurred tiles, which one object leaves to the next.
+/// Buffers for blurred tiles, reused from object to object.
 #[derive(Debug, Default)]
-struct Spare {
+struct SpareBuffers {
     tiles: Vec<Vec<f32>>,
     scratches: Vec<Scratch>,
 }
 
-/// The absorbance of a piece as it is in a plane.
+/// The absorbance of a piece in a plane.
 struct Blurred<'a> {
-    /// Nothing if it lies outside the image.
+    /// `None` if it is outside the image.
     tile: Option<Cow<'a, Tile>>,
     /// Mean over the mask of the piece.
     mean: f64,
-    /// What its dyes absorb at this wavelength, relative to the tile.
+    /// Absorbance of its dyes at this wavelength, relative to the tile.
     strength: f32,
 }
 
 impl GaussianPath {
-    pub(super) fn new(slide: Slide<'_>, sigma_xy_um: f64, sigma_z_um_per_um: f64) -> Result<Self, Cause> {
-        let view = slide.scene.view;
+    pub(super) fn new(specimen: Specimen<'_>, sigma_xy_um: f64, sigma_z_um_per_um: f64) -> Result<Self, Cause> {
+        let view = specimen.scene.view;
         let in_plane = Gaussian::truncated(sigma_xy_um / view.pixel_um, Method::Direct, LOST_TAIL_IN_PLANE)?;
-        let wavelength_um = match slide.scene.light {
+        let wavelength_um = match specimen.scene.light {
             SceneLight::Monochrome { wavelength_um, .. } => wavelength_um,
             SceneLight::Colour { .. } => return Err(Cause::ColourWithGaussians),
         };
         let px_per_um = sigma_z_um_per_um / view.pixel_um;
         let frame = Window { origin: [0, 0], width: view.width, height: view.height };
-        Ok(Self { frame, in_plane, px_per_um, wavelength_um, spare: Mutex::default() })
+        Ok(Self { frame, in_plane, px_per_um, wavelength_um, free_buffers: Mutex::default() })
     }
 
-    /// The channel of `light` becomes the absorbance I_p of the phantoms.
-    pub(super) fn pass(&self, slide: Slide<'_>, focus: FocusAt, light: &mut Light) -> Result<Passage, Cause> {
+    /// Computes the absorbance I_p of the phantoms in the channel of `light`.
+    pub(super) fn transmit(
+        &self,
+        specimen: Specimen<'_>,
+        focus: FocusAt,
+        light: &mut LightBuffers,
+    ) -> Result<TransmissionStats, Cause> {
         let mut absorbances = Vec::new();
         let blur = |index: usize| {
-            let off_um = match focus {
+            let defocus_um = match focus {
                 FocusAt::Everywhere => 0.0,
-                // σ grows with the distance from focus: the object's own depth, exactly, in every plane.
+                // σ grows with the distance from focus: the exact depth of the object, in every plane.
                 FocusAt::Stage(plane) => {
-                    let depth_um = slide.scene.objects[index].depth_um;
-                    slide.scene.seen_at_um(plane, depth_um) - depth_um
+                    let depth_um = specimen.scene.objects[index].depth_um;
+                    specimen.scene.seen_at_um(plane, depth_um) - depth_um
                 }
             };
-            let gaussian = self.blur(off_um)?;
-            let pieces = slide.phantoms[index].pieces.iter();
+            let gaussian = self.blur(defocus_um)?;
+            let pieces = specimen.phantoms[index].pieces.iter();
             Ok(pieces.map(|piece| self.blur_piece(piece, gaussian.as_ref())).collect::<Vec<_>>())
         };
-        // Eq. 14: I_p = Σ pᵢ ∗ G_σz, in the order of the objects whatever thread made them.
-        threads::each(slide.threads, slide.phantoms.len(), blur, |_, pieces: Result<_, Cause>| {
+        // Eq. 14: I_p = Σ pᵢ ∗ G_σz, in the order of the objects.
+        threads::each(specimen.threads, specimen.phantoms.len(), blur, |_, pieces: Result<_, Cause>| {
             for piece in pieces? {
                 absorbances.push(piece.mean * f64::from(piece.strength));
                 let Some(tile) = piece.tile else { continue };
                 add(&mut light.channels[0], self.frame, &tile, piece.strength);
                 if let Cow::Owned(tile) = tile {
-                    self.spare().tiles.push(tile.values);
+                    self.free_buffers().tiles.push(tile.values);
                 }
             }
             Ok::<_, Cause>(())
         })?;
-        Ok(Passage { absorbances: vec![absorbances], floored: 0 })
+        Ok(TransmissionStats { absorbances: vec![absorbances], clipped_px: 0 })
     }
 
     fn blur_piece<'a>(&self, piece: &'a Piece, gaussian: Option<&Gaussian>) -> Blurred<'a> {
@@ -108,10 +113,10 @@ impl GaussianPath {
         let tile = match gaussian {
             None => Cow::Borrowed(tile),
             Some(gaussian) => {
-                let values = self.spare().tiles.pop().unwrap_or_default();
-                let mut scratch = self.spare().scratches.pop().unwrap_or_default();
-                let tile = blurred(tile, gaussian, values, &mut scratch);
-                self.spare().scratches.push(scratch);
+                let values = self.free_buffers().tiles.pop().unwrap_or_default();
+                let mut scratch = self.free_buffers().scratches.pop().unwrap_or_default();
+                let tile = blurred_tile(tile, gaussian, values, &mut scratch);
+                self.free_buffers().scratches.push(scratch);
                 Cow::Owned(tile)
             }
         };
@@ -119,14 +124,14 @@ impl GaussianPath {
         Blurred { tile: Some(tile), mean, strength }
     }
 
-    /// The blur of an object so far from focus, if it is any.
-    pub(super) fn blur(&self, off_um: f64) -> Result<Option<Gaussian>, Cause> {
-        let sigma_px = self.px_per_um * off_um.abs();
+    /// Returns the blur of an object at this defocus; `None` if it is negligible.
+    pub(super) fn blur(&self, defocus_um: f64) -> Result<Option<Gaussian>, Cause> {
+        let sigma_px = self.px_per_um * defocus_um.abs();
         let gaussian = (sigma_px > SHARP_PX).then(|| Gaussian::truncated(sigma_px, Method::Decimated, LOST_TAIL));
         Ok(gaussian.transpose()?)
     }
 
-    fn spare(&self) -> MutexGuard<'_, Spare> {
-        self.spare.lock().unwrap_or_else(PoisonError::into_inner)
+    fn free_buffers(&self) -> MutexGuard<'_, SpareBuffers> {
+        self.free_buffers.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

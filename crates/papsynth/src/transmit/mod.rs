@@ -1,13 +1,14 @@
 //! Signal transmission: from phantoms to the light on the sensor (Eqs. 8–14).
 //!
-//! Two ways lead there, as the scene's optics say: [`bright_field`], partially coherent bright field, object by object;
-//! [`gaussian`], the paper's Gaussians on the absorbance. Both give the light of a plane in bands of rows.
+//! The optics of the scene select one of two models: [`bright_field`], partially coherent bright field, object by
+//! object; [`gaussian`], the paper's Gaussian blur of the absorbance. Both return the light of a plane in bands of
+//! rows.
 
 mod bright_field;
-mod canvas;
+mod channel_lights;
 mod gaussian;
 mod light;
-mod lights;
+mod object_transmission;
 mod overlap;
 
 use optics_psf::{Border, Gaussian};
@@ -17,99 +18,103 @@ use crate::error::Cause;
 use crate::scene::{Scene, SceneOptics, View};
 
 use bright_field::BrightFieldPath;
-use canvas::clear;
+pub(crate) use channel_lights::MicroscopeCache;
 use gaussian::GaussianPath;
-pub(crate) use light::{FocusAt, Light, Passage, Slide};
-pub(crate) use lights::Lenses;
+pub(crate) use light::{FocusAt, LightBuffers, Specimen, TransmissionStats};
+use object_transmission::clear;
 
-/// Rows that go from light to grey levels together: few enough to stay in the cache of one core.
-pub(crate) const BAND: usize = 32;
+/// Rows per band: few enough that a band stays in the cache of one core between light and grey levels.
+pub(crate) const BAND_ROWS: usize = 32;
 
-/// Rows of the light of one channel of a plane, as fractions of full scale.
-pub(crate) struct Band<'a> {
-    /// The first row.
-    pub(crate) first: usize,
-    /// 10^(I_b − I_p) before the spread in the image plane, where that spread is a step of its own; else empty.
-    pub(crate) sharp: &'a [f32],
-    /// The same after it, channel by channel.
-    pub(crate) spread: &'a mut [&'a mut [f32]],
+/// Light of some rows of a plane, as fractions of full scale.
+pub(crate) struct RowBand<'a> {
+    pub(crate) first_row: usize,
+    /// 10^(I_b − I_p) before the blur in the image plane, if that blur is a separate step; else empty.
+    pub(crate) unblurred: &'a [f32],
+    /// Light on the sensor, one slice per channel.
+    pub(crate) blurred: &'a mut [&'a mut [f32]],
 }
 
-/// What all planes of one scene share.
+/// The optics of a scene, shared by all its planes.
 pub(crate) enum LightPath {
     Gaussian(Box<GaussianPath>),
     BrightField(Box<BrightFieldPath>),
 }
 
 impl LightPath {
-    pub(crate) fn new(slide: Slide<'_>, lenses: &Lenses) -> Result<Self, Cause> {
-        Ok(match &slide.scene.optics {
+    pub(crate) fn new(specimen: Specimen<'_>, microscopes: &MicroscopeCache) -> Result<Self, Cause> {
+        Ok(match &specimen.scene.optics {
             SceneOptics::Gaussian { sigma_xy_um, sigma_z_um_per_um } => {
-                Self::Gaussian(Box::new(GaussianPath::new(slide, *sigma_xy_um, *sigma_z_um_per_um)?))
+                Self::Gaussian(Box::new(GaussianPath::new(specimen, *sigma_xy_um, *sigma_z_um_per_um)?))
             }
             SceneOptics::BrightField(microscope) => {
-                Self::BrightField(Box::new(BrightFieldPath::new(slide, microscope, lenses)?))
+                Self::BrightField(Box::new(BrightFieldPath::new(specimen, microscope, microscopes)?))
             }
         })
     }
 
-    /// Lets light through the phantoms.
-    pub(crate) fn pass(&self, slide: Slide<'_>, focus: FocusAt, light: &mut Light) -> Result<Passage, Cause> {
-        let View { width, height, .. } = slide.scene.view;
+    /// Computes the light that the phantoms transmit.
+    pub(crate) fn transmit(
+        &self,
+        specimen: Specimen<'_>,
+        focus: FocusAt,
+        light: &mut LightBuffers,
+    ) -> Result<TransmissionStats, Cause> {
+        let View { width, height, .. } = specimen.scene.view;
         light.channels.iter_mut().for_each(|channel| clear(channel, width * height));
         match self {
-            Self::Gaussian(path) => path.pass(slide, focus, light),
-            Self::BrightField(path) => path.pass(slide, focus, light),
+            Self::Gaussian(path) => path.transmit(specimen, focus, light),
+            Self::BrightField(path) => path.transmit(specimen, focus, light),
         }
     }
 
-    /// Gives the light, band by band from the top.
-    pub(crate) fn spread(&self, view: View, light: &mut Light, mut visit: impl FnMut(Band<'_>)) {
+    /// Passes the light on the sensor to `visit`, band by band from the top.
+    pub(crate) fn for_each_band(&self, view: View, light: &mut LightBuffers, mut visit: impl FnMut(RowBand<'_>)) {
         let View { width, height, .. } = view;
         light.bands.resize(light.channels.len(), Vec::new());
         let mut lit = 0;
-        for first in (0..height).step_by(BAND) {
-            let end = (first + BAND).min(height);
-            let needed = (end + self.picture_reach_px()).min(height);
+        for first in (0..height).step_by(BAND_ROWS) {
+            let end = (first + BAND_ROWS).min(height);
+            let needed = (end + self.image_blur_radius_px()).min(height);
             let rows = lit * width..needed * width;
             match self {
                 // 10^(I_b − I_p).
                 Self::Gaussian(_) => exp10_from(&light.empty_log10[rows.clone()], &mut light.channels[0][rows]),
                 Self::BrightField(path) => path.illuminate(light, rows),
             }
-            let Light { channels, bands, scratch, .. } = light;
+            let LightBuffers { channels, bands, scratch, .. } = light;
             lit = needed;
-            for (whole, band) in channels.iter().zip(bands.iter_mut()) {
+            for (image, band) in channels.iter().zip(bands.iter_mut()) {
                 band.resize((end - first) * width, 0.0);
-                match self.further() {
-                    Some(gaussian) => gaussian.blur_rows_into(whole, width, Border::Reflect, first, band, scratch),
-                    None => band.copy_from_slice(&whole[first * width..end * width]),
+                match self.extra_blur() {
+                    Some(gaussian) => gaussian.blur_rows_into(image, width, Border::Reflect, first, band, scratch),
+                    None => band.copy_from_slice(&image[first * width..end * width]),
                 }
             }
-            let sharp = match self {
+            let unblurred = match self {
                 Self::Gaussian(_) => &channels[0][first * width..end * width],
                 Self::BrightField(_) => &[],
             };
-            let mut spread: Vec<&mut [f32]> = bands.iter_mut().map(Vec::as_mut_slice).collect();
-            visit(Band { first, sharp, spread: &mut spread });
+            let mut blurred: Vec<&mut [f32]> = bands.iter_mut().map(Vec::as_mut_slice).collect();
+            visit(RowBand { first_row: first, unblurred, blurred: &mut blurred });
         }
     }
 
-    /// The spread of the finished light, if there is any.
-    fn further(&self) -> Option<&Gaussian> {
+    /// Returns the blur of the combined light, if any.
+    fn extra_blur(&self) -> Option<&Gaussian> {
         match self {
             Self::Gaussian(path) => Some(&path.in_plane),
-            Self::BrightField(path) => path.further.as_ref(),
+            Self::BrightField(path) => path.extra_blur.as_ref(),
         }
     }
 
-    /// Pixels round a picture that light reaches it from.
-    pub(crate) fn picture_reach_px(&self) -> usize {
-        self.further().map_or(0, Gaussian::radius)
+    /// Returns the radius in pixels of the blur of the combined light.
+    pub(crate) fn image_blur_radius_px(&self) -> usize {
+        self.extra_blur().map_or(0, Gaussian::radius)
     }
 
-    /// Pixels by which an object of that depth is spread in some plane of its scene.
-    pub(crate) fn object_reach_px(&self, scene: &Scene, depth_um: f64) -> Result<usize, Cause> {
+    /// Returns the largest blur radius, over all planes of the scene, of an object at this depth, in pixels.
+    pub(crate) fn object_blur_radius_px(&self, scene: &Scene, depth_um: f64) -> Result<usize, Cause> {
         let mut widest = 0;
         for &plane_um in &scene.planes_um {
             let seen_at_um = scene.seen_at_um(plane_um, depth_um);

@@ -1,58 +1,60 @@
-//! Colours where stained things lie over each other.
+//! Colours of overlapping stained objects.
 //!
-//! Of each object the mean light of a channel's band is filtered, and the means of several objects are multiplied. That
-//! is too dark where they absorb the same wavelengths: the first leaves less to absorb for the second. What is wrong is
-//! the ratio of the light behind all dyes together to the product of the lights behind each object's, and by that the
-//! picture is multiplied. It is computed on the camera's pixels from amounts of dye blurred as far as each object is
-//! out of focus.
+//! Each object transmits a mean fraction of a channel's band, and the fractions of overlapping objects are multiplied.
+//! This is too dark where objects absorb the same wavelengths: the first leaves less light to absorb for the second.
+//! The image is therefore multiplied by the ratio of the light behind all dyes together to the product of the light
+//! behind each object. The ratio is computed on camera pixels, from amounts of dye with the defocus blur of each
+//! object.
 
 use dye_spectra::{Colour, DYES};
 use multiversion::multiversion;
 use optics_psf::{Gaussian, Method, Scratch};
 
-use super::canvas::{Window, add, blurred};
-use super::light::Slide;
+use super::light::Specimen;
+use super::object_transmission::{Window, add, blurred_tile};
 use crate::error::Cause;
 use crate::phantom::piece::Phantom;
-use crate::phantom::tile::{Tile, lay};
+use crate::phantom::tile::{Tile, overlay};
 use crate::scene::{Scene, View};
 use crate::threads;
 
-/// Absorbance below which an object changes no colour behind it.
+/// Absorbance below which an object does not change the colour behind it.
 const FAINT: f32 = 0.01;
 
-/// Blur that is not worth the while, px.
+/// Standard deviation below which blur is skipped, px.
 const SHARP_PX: f64 = 0.5;
 
-/// Share of a blurred amount that is left out.
+/// Fraction of a blurred amount in the truncated tails.
 const LOST_TAIL: f64 = 1e-3;
 
-/// What overlaps in a scene: for each object that meets another its pieces' absorbances, on the camera's pixels.
+/// The overlapping objects of a scene, on camera pixels.
 pub(super) struct Overlaps {
-    objects: Vec<Overlapping>,
+    objects: Vec<OverlappingObject>,
 }
 
-struct Overlapping {
+/// An object that may overlap another.
+struct OverlappingObject {
     index: usize,
     /// The absorbance of each piece.
     pieces: Vec<Tile>,
 }
 
-/// An object's amounts of dye, and what they let through.
-struct Stained {
-    /// Without pixels where there is none of a dye.
+/// Amounts of dye of an object, and their transmittance.
+struct ObjectDyes {
+    /// Empty for dyes that the object does not contain.
     amounts: [Tile; DYES],
     transmittance: [Tile; 3],
 }
 
 impl Overlaps {
-    /// Of objects whose boxes meet another's or, since what overlaps beyond the border of a frame is not known in it, of all that
-    /// are stained.
-    pub(super) fn new(slide: Slide<'_>) -> Self {
-        let (scene, phantoms) = (slide.scene, slide.phantoms);
+    /// Collects the objects whose bounding boxes intersect.
+    ///
+    /// On a slide, overlaps beyond the border of a frame are unknown, so all stained objects are collected.
+    pub(super) fn new(specimen: Specimen<'_>) -> Self {
+        let (scene, phantoms) = (specimen.scene, specimen.phantoms);
         let (n, all) = (scene.oversampling(), scene.frame.is_some());
-        let boxes: Vec<Option<Window>> = phantoms.iter().map(|phantom| stained(phantom, scene)).collect();
-        // Sorted by their left edges, only neighbours can meet.
+        let boxes: Vec<Option<Window>> = phantoms.iter().map(|phantom| stained_window(phantom, scene)).collect();
+        // Boxes sorted by their left edges intersect only with neighbours.
         let mut order: Vec<usize> = (0..boxes.len()).filter(|&i| boxes[i].is_some()).collect();
         order.sort_by_key(|&i| boxes[i].map(|b| b.origin[0]));
         let mut meets: Vec<bool> = boxes.iter().map(|b| all && b.is_some()).collect();
@@ -69,41 +71,41 @@ impl Overlaps {
             }
         }
         let indices: Vec<usize> = (0..boxes.len()).filter(|&i| meets[i]).collect();
-        let objects = threads::map(slide.threads, &indices, |&index| Overlapping {
+        let objects = threads::map(specimen.threads, &indices, |&index| OverlappingObject {
             index,
             pieces: phantoms[index].pieces.iter().map(|piece| piece.absorbance.coarsened(n)).collect(),
         });
         Self { objects }
     }
 
-    /// Corrects three channels. `blur_px` says how widely each object is blurred, as a standard deviation.
+    /// Corrects three channels. `blur_px` returns the standard deviation of the defocus blur of each object.
     pub(super) fn correct(
         &self,
         colour: &Colour,
-        slide: Slide<'_>,
+        specimen: Specimen<'_>,
         blur_px: impl Fn(usize) -> f64 + Sync + Send,
         channels: &mut [Vec<f32>],
     ) -> Result<(), Cause> {
         if self.objects.len() < 2 {
             return Ok(());
         }
-        let View { width, height, .. } = slide.scene.view;
-        let (pixels, whole) = (width * height, Window { origin: [0, 0], width, height });
+        let View { width, height, .. } = specimen.scene.view;
+        let (pixels, frame) = (width * height, Window { origin: [0, 0], width, height });
         let mut layers = vec![0.0_f32; pixels];
         let mut totals: [Vec<f32>; DYES] = core::array::from_fn(|_| vec![0.0; pixels]);
         let mut products: [Vec<f32>; 3] = core::array::from_fn(|_| vec![1.0; pixels]);
-        let stained = threads::map(slide.threads, &self.objects, |object| {
-            object.stain(colour, &slide.phantoms[object.index], blur_px(object.index))
+        let object_dyes = threads::map(specimen.threads, &self.objects, |object| {
+            object.dyes(colour, &specimen.phantoms[object.index], blur_px(object.index))
         });
-        for stained in stained {
-            let stained = stained?;
-            for (total, amounts) in totals.iter_mut().zip(&stained.amounts) {
-                add(total, whole, amounts, 1.0);
+        for dyes in object_dyes {
+            let dyes = dyes?;
+            for (total, amounts) in totals.iter_mut().zip(&dyes.amounts) {
+                add(total, frame, amounts, 1.0);
             }
-            for (product, transmittance) in products.iter_mut().zip(&stained.transmittance) {
+            for (product, transmittance) in products.iter_mut().zip(&dyes.transmittance) {
                 multiply(product, width, transmittance);
             }
-            count(&mut layers, width, &stained.transmittance[1]);
+            count(&mut layers, width, &dyes.transmittance[1]);
         }
         let [h, e, l, o, n] = &totals;
         let mut together: [Vec<f32>; 3] = core::array::from_fn(|_| vec![0.0; width]);
@@ -122,18 +124,19 @@ impl Overlaps {
     }
 }
 
-impl Overlapping {
-    fn stain(&self, colour: &Colour, phantom: &Phantom, blur_px: f64) -> Result<Stained, Cause> {
-        let spread;
+impl OverlappingObject {
+    fn dyes(&self, colour: &Colour, phantom: &Phantom, blur_px: f64) -> Result<ObjectDyes, Cause> {
+        let blurred;
         let pieces = if blur_px > SHARP_PX {
             let gaussian = Gaussian::truncated(blur_px, Method::Decimated, LOST_TAIL)?;
-            let tiles = self.pieces.iter().map(|tile| blurred(tile, &gaussian, Vec::new(), &mut Scratch::default()));
-            spread = tiles.collect::<Vec<_>>();
-            &spread
+            let tiles =
+                self.pieces.iter().map(|tile| blurred_tile(tile, &gaussian, Vec::new(), &mut Scratch::default()));
+            blurred = tiles.collect::<Vec<_>>();
+            &blurred
         } else {
             &self.pieces
         };
-        let window = Window::around(pieces.iter(), 1).expect("what overlaps has pixels");
+        let window = Window::around(pieces.iter(), 1).expect("overlapping objects have pixels");
         let samples = window.width * window.height;
         let blank = |samples| Tile { origin: window.origin, width: window.width, values: vec![0.0; samples] };
         let mut amounts: [Tile; DYES] = core::array::from_fn(|_| blank(0));
@@ -147,12 +150,12 @@ impl Overlapping {
         let [r, g, b] = &mut transmittance;
         let light = [&mut r.values[..], &mut g.values, &mut b.values];
         colour.transmittance_into(amounts.each_ref().map(|amounts| &amounts.values[..]), light);
-        Ok(Stained { amounts, transmittance })
+        Ok(ObjectDyes { amounts, transmittance })
     }
 }
 
-/// The camera's pixels over which an object is stained enough to matter.
-fn stained(phantom: &Phantom, scene: &Scene) -> Option<Window> {
+/// Returns the camera pixels over which the stain of an object is not negligible.
+fn stained_window(phantom: &Phantom, scene: &Scene) -> Option<Window> {
     let (grid, n) = (scene.grid(), scene.oversampling());
     let strong = phantom.pieces.iter().filter(|piece| {
         let dyes: f64 = piece.dyes[..DYES - 1].iter().sum();
@@ -168,21 +171,21 @@ fn stained(phantom: &Phantom, scene: &Scene) -> Option<Window> {
 
 #[multiversion(targets = "simd")]
 fn multiply(image: &mut [f32], width: usize, tile: &Tile) {
-    lay(image, width, [0, 0], tile, |row, values| row.iter_mut().zip(values).for_each(|(v, value)| *v *= value));
+    overlay(image, width, [0, 0], tile, |row, values| row.iter_mut().zip(values).for_each(|(v, value)| *v *= value));
 }
 
-/// Counts what is not empty.
+/// Adds 1 where a tile transmits less than all light.
 #[multiversion(targets = "simd")]
 fn count(image: &mut [f32], width: usize, tile: &Tile) {
-    lay(image, width, [0, 0], tile, |row, values| {
+    overlay(image, width, [0, 0], tile, |row, values| {
         row.iter_mut().zip(values).for_each(|(layers, value)| *layers += if *value < 1.0 { 1.0 } else { 0.0 });
     });
 }
 
-/// Light below which ratios of lights mean nothing: what is as dark is left as it is.
+/// Light added to both terms of the ratio, so that very dark pixels are unchanged.
 const DARK: f32 = 1e-3;
 
-/// Multiplies by the ratio of what dyes let through together to what they would one by one, where there are several.
+/// Multiplies light by the ratio of joint to separate transmittance where several objects overlap.
 #[multiversion(targets = "simd")]
 fn scale(channel: &mut [f32], together: &[f32], product: &[f32], layers: &[f32]) {
     for (((light, together), product), layers) in channel.iter_mut().zip(together).zip(product).zip(layers) {

@@ -1,10 +1,10 @@
-//! What follows from the masks: front-most masks, label maps, layers.
+//! Visible masks, label maps and overlap counts, computed from the complete masks.
 
 use super::mask::{Mask, Run, next};
 use super::object::Truth;
 use super::part::Group;
 
-/// The id of an object at each pixel, 0 where there is none.
+/// The id of an object at each pixel; 0 where there is none.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LabelMap {
     /// Columns.
@@ -13,33 +13,33 @@ pub struct LabelMap {
     pub ids: Vec<u32>,
 }
 
-/// Cuts from each mask what is visible of it.
+/// Returns the visible part of each mask.
 ///
-/// `objects` are `(id, depth, mask)`; the nearer to the objective, the larger the depth. Of two at the same depth the
-/// one with the larger id lies in front.
+/// `objects` are `(id, depth, mask)`; a larger depth is nearer to the objective. Of two objects at the same depth, the
+/// one with the larger id covers the other.
 ///
 /// # Panics
-/// If a mask leaves the image.
+/// If a mask extends beyond the image.
 #[must_use]
-pub fn front_masks(objects: &[(u32, f64, &Mask)], width: usize, height: usize) -> Vec<Mask> {
-    fronts(objects, width, &mut vec![0; width * height])
+pub fn visible_masks(objects: &[(u32, f64, &Mask)], width: usize, height: usize) -> Vec<Mask> {
+    visible_masks_in(objects, width, &mut vec![0; width * height])
 }
 
-/// [`front_masks`] on an image of zeros, which is one again afterwards.
-pub(crate) fn fronts(objects: &[(u32, f64, &Mask)], width: usize, ids: &mut [u32]) -> Vec<Mask> {
+/// [`visible_masks`] with a caller's image of zeros; the image is zero again afterwards.
+pub(crate) fn visible_masks_in(objects: &[(u32, f64, &Mask)], width: usize, ids: &mut [u32]) -> Vec<Mask> {
     let mut order: Vec<usize> = (0..objects.len()).collect();
     order.sort_by(|&a, &b| objects[a].1.total_cmp(&objects[b].1).then(objects[a].0.cmp(&objects[b].0)));
     for (id, _, mask) in order.into_iter().map(|index| objects[index]) {
         paint(mask, width, ids, |pixel| *pixel = id);
     }
-    let fronts = objects.iter().map(|(id, _, mask)| visible(*id, mask, ids, width)).collect();
+    let masks = objects.iter().map(|(id, _, mask)| visible(*id, mask, ids, width)).collect();
     for (_, _, mask) in objects {
         paint(mask, width, ids, |pixel| *pixel = 0);
     }
-    fronts
+    masks
 }
 
-/// Visits every pixel of a mask.
+/// Applies a function to every pixel of a mask.
 fn paint<T>(mask: &Mask, width: usize, image: &mut [T], visit: impl Fn(&mut T)) {
     for run in mask.runs() {
         let row = run.y as usize * width;
@@ -48,10 +48,10 @@ fn paint<T>(mask: &Mask, width: usize, image: &mut [T], visit: impl Fn(&mut T)) 
 }
 
 impl Truth {
-    /// The label map of a group: the id of its front-most object at each pixel.
+    /// Returns the label map of a group: the id of the visible object at each pixel.
     ///
     /// # Panics
-    /// If a mask leaves the image.
+    /// If a mask extends beyond the image.
     #[must_use]
     pub fn labels(&self, group: Group) -> LabelMap {
         let mut ids = Vec::new();
@@ -59,22 +59,22 @@ impl Truth {
         LabelMap { width: self.width, ids }
     }
 
-    /// The same into memory of yours, whatever it held.
+    /// Writes the ids of [`labels`](Self::labels) to `ids`; previous contents are replaced.
     ///
     /// # Panics
-    /// If a mask leaves the image.
+    /// If a mask extends beyond the image.
     pub fn labels_into(&self, group: Group, ids: &mut Vec<u32>) {
         ids.clear();
         ids.resize(self.width * self.height, 0);
         for object in self.objects.iter().filter(|object| object.group() == group) {
-            paint(&object.front, self.width, ids, |pixel| *pixel = object.id);
+            paint(&object.visible, self.width, ids, |pixel| *pixel = object.id);
         }
     }
 
-    /// Number of cytoplasms that lie over each other at each pixel, row by row.
+    /// Returns the number of overlapping cytoplasms at each pixel, row by row.
     ///
     /// # Panics
-    /// If a mask leaves the image.
+    /// If a mask extends beyond the image.
     #[must_use]
     pub fn layers(&self) -> Vec<u16> {
         let mut layers = Vec::new();
@@ -82,10 +82,10 @@ impl Truth {
         layers
     }
 
-    /// The same into memory of yours, whatever it held.
+    /// Writes [`layers`](Self::layers) to `layers`; previous contents are replaced.
     ///
     /// # Panics
-    /// If a mask leaves the image.
+    /// If a mask extends beyond the image.
     pub fn layers_into(&self, layers: &mut Vec<u16>) {
         layers.clear();
         layers.resize(self.width * self.height, 0);
@@ -95,7 +95,7 @@ impl Truth {
     }
 }
 
-/// The pixels of a mask that show its own id.
+/// Returns the pixels of a mask at which the image holds its id.
 fn visible(id: u32, mask: &Mask, ids: &[u32], width: usize) -> Mask {
     let mut runs: Vec<Run> = Vec::new();
     for run in mask.runs() {
@@ -111,7 +111,7 @@ fn visible(id: u32, mask: &Mask, ids: &[u32], width: usize) -> Mask {
     Mask::from_runs(runs)
 }
 
-/// A column of an image, all of which fit.
+/// Converts a column; all columns of an image fit.
 fn column(x: usize) -> u32 {
     u32::try_from(x).unwrap_or(u32::MAX)
 }
@@ -122,7 +122,7 @@ mod tests {
     use crate::key::Key;
     use crate::random;
 
-    /// Ten lines that are obviously right: at each pixel the nearest object that covers it.
+    /// Reference: at each pixel the id of the nearest object that covers it.
     fn slow(objects: &[(u32, f64, &Mask)], width: usize, height: usize) -> Vec<u32> {
         (0..width * height)
             .map(|pixel| {
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_object_shows_and_fronts_partition_what_is_covered() {
+    fn the_nearest_object_is_visible_and_visible_masks_partition_the_covered_pixels() {
         let (width, height) = (24, 18);
         let mut rng = Key { seed: 3, index: 0 }.stream("test", 0, "labels");
         let masks: Vec<Mask> = (0..7)
@@ -149,13 +149,13 @@ mod tests {
             .collect();
         let objects: Vec<(u32, f64, &Mask)> =
             masks.iter().enumerate().map(|(i, m)| (i as u32 + 1, f64::from(i as u32 % 3), m)).collect();
-        let fronts = front_masks(&objects, width, height);
+        let visible = visible_masks(&objects, width, height);
         let mut ids = vec![0; width * height];
-        for ((id, _, _), front) in objects.iter().zip(&fronts) {
-            front.pixels(width).for_each(|pixel| ids[pixel] = *id);
+        for ((id, _, _), mask) in objects.iter().zip(&visible) {
+            mask.pixels(width).for_each(|pixel| ids[pixel] = *id);
         }
         assert_eq!(ids, slow(&objects, width, height));
         let covered = ids.iter().filter(|&&id| id > 0).count() as u64;
-        assert_eq!(fronts.iter().map(Mask::area).sum::<u64>(), covered);
+        assert_eq!(visible.iter().map(Mask::area).sum::<u64>(), covered);
     }
 }

@@ -2,7 +2,7 @@
 
 /// A set of pixels of an image, as horizontal runs in raster order.
 ///
-/// Runs of a row are disjoint and sorted; nothing lies outside the image.
+/// Runs of a row are disjoint and sorted; all pixels are inside the image.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Mask {
     runs: Vec<Run>,
@@ -19,7 +19,7 @@ pub struct Run {
     pub x1: u32,
 }
 
-/// The smallest box that holds a mask: pixels `x..x+width`, `y..y+height`.
+/// Bounding box of a mask: pixels `x..x+width`, `y..y+height`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Bounds {
     /// Left column.
@@ -33,8 +33,9 @@ pub struct Bounds {
 }
 
 impl Mask {
-    /// The pixels where `inside` holds of a tile of `tile_width` columns whose upper left pixel lies at `origin`,
-    /// clipped to an image of `width` x `height`.
+    /// Returns the pixels of a tile for which `inside` is true, clipped to an image of `width` x `height`.
+    ///
+    /// The tile has `tile_width` columns; its upper left pixel is pixel `origin` of the image.
     #[must_use]
     pub fn from_tile(
         tile: &[f32],
@@ -63,7 +64,7 @@ impl Mask {
         Self { runs }
     }
 
-    /// The mask made of these runs, which must be sorted by row and column, not empty and disjoint.
+    /// Creates a mask from runs, which must be non-empty, disjoint, and sorted by row and column.
     #[must_use]
     pub fn from_runs(runs: Vec<Run>) -> Self {
         debug_assert!(runs.iter().all(|r| r.x0 < r.x1));
@@ -71,7 +72,7 @@ impl Mask {
         Self { runs }
     }
 
-    /// All pixels of these masks.
+    /// Returns the union of masks.
     #[must_use]
     pub fn union<'a>(masks: impl IntoIterator<Item = &'a Self>) -> Self {
         let mut all: Vec<Run> = masks.into_iter().flat_map(|mask| &mask.runs).copied().collect();
@@ -86,25 +87,25 @@ impl Mask {
         Self { runs }
     }
 
-    /// The runs in raster order.
+    /// Returns the runs in raster order.
     #[must_use]
     pub fn runs(&self) -> &[Run] {
         &self.runs
     }
 
-    /// Whether no pixel belongs to the mask.
+    /// Whether the mask has no pixels.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.runs.is_empty()
     }
 
-    /// Number of pixels.
+    /// Returns the number of pixels.
     #[must_use]
     pub fn area(&self) -> u64 {
         self.runs.iter().map(|r| u64::from(r.x1 - r.x0)).sum()
     }
 
-    /// The smallest box around the mask, if it has a pixel.
+    /// Returns the bounding box, or `None` for an empty mask.
     #[must_use]
     pub fn bounds(&self) -> Option<Bounds> {
         let (first, last) = (self.runs.first()?, self.runs.last()?);
@@ -113,7 +114,7 @@ impl Mask {
         Some(Bounds { x, y: first.y, width: end - x, height: last.y + 1 - first.y })
     }
 
-    /// Mean position of the pixels' centres, if there is a pixel.
+    /// Returns the mean position of the pixel centres, or `None` for an empty mask.
     #[must_use]
     pub fn centroid(&self) -> Option<[f64; 2]> {
         let area = self.area();
@@ -129,7 +130,7 @@ impl Mask {
         Some([x / area as f64, y / area as f64])
     }
 
-    /// Every pixel as an index into an image of `width` columns.
+    /// Returns every pixel as an index into an image of `width` columns.
     pub fn pixels(&self, width: usize) -> impl Iterator<Item = usize> + '_ {
         self.runs.iter().flat_map(move |r| {
             let row = r.y as usize * width;
@@ -138,15 +139,15 @@ impl Mask {
     }
 }
 
-/// The first place from `start` on where `is` holds. Whole blocks are passed over at once.
+/// Returns the first index from `start` for which `is` is true. Tests blocks of values at once.
 #[inline(always)]
 pub(super) fn next<T: Copy>(values: &[T], start: usize, is: impl Fn(T) -> bool) -> Option<usize> {
-    /// Values that are looked at side by side.
+    /// Values per block.
     const BLOCK: usize = 16;
     let rest = &values[start..];
     let none = |block: &&[T]| !block.iter().fold(false, |any, &value| any | is(value));
-    let passed = BLOCK * rest.chunks_exact(BLOCK).take_while(none).count();
-    rest[passed..].iter().position(|&value| is(value)).map(|place| start + passed + place)
+    let skipped = BLOCK * rest.chunks_exact(BLOCK).take_while(none).count();
+    rest[skipped..].iter().position(|&value| is(value)).map(|index| start + skipped + index)
 }
 
 fn run(y: i64, left: i64, from: usize, to: usize) -> Run {
@@ -159,7 +160,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_union_has_every_pixel_once() {
+    fn a_union_contains_every_pixel_once() {
         let masks = [[0.0, 1.0, 1.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.0, 1.0, 1.0], [0.0, 0.0, 1.0, 1.0, 0.0, 0.0]]
             .map(|tile| Mask::from_tile(&tile, 3, [0, 0], 9, 9, |v| v > 0.5));
         let union = Mask::union(&masks);
@@ -169,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tile_is_clipped_and_measured_as_by_hand() {
+    fn area_bounds_and_centroid_of_a_clipped_tile_match_hand_computed_values() {
         let tile = [0.0, 1.0, 1.0, 0.0, 1.0, 0.0, 1.0, 1.0];
         let mask = Mask::from_tile(&tile, 4, [1, 2], 10, 10, |v| v >= 0.5);
         assert_eq!(mask.area(), 5);

@@ -1,6 +1,6 @@
-//! What is known of an image because it was made: masks, labels, layers, and a row for every object.
+//! Ground truth of an image: masks, label maps, overlap counts, and a row for every object.
 //!
-//! Truth comes from the scene and from exact coverage, never from the image.
+//! It is computed from the scene and from exact coverage, never from the image.
 
 mod labels;
 mod mask;
@@ -8,10 +8,10 @@ mod object;
 pub(crate) mod part;
 pub(crate) mod traits;
 
-pub(crate) use labels::fronts;
-pub use labels::{LabelMap, front_masks};
+pub(crate) use labels::visible_masks_in;
+pub use labels::{LabelMap, visible_masks};
 pub use mask::{Bounds, Mask, Run};
-pub(crate) use object::with_layers;
+pub(crate) use object::merge_layers;
 pub use object::{ObjectTruth, Truth};
 pub use part::{COVERED, Group, Part};
 pub use traits::{Trait, Traits, UnknownTrait};

@@ -1,4 +1,4 @@
-//! What is known of an image: a row for every object.
+//! Rows of the ground truth: one for every object.
 
 use super::mask::Mask;
 use super::part::{Group, Part};
@@ -6,56 +6,55 @@ use super::traits::Traits;
 use crate::debris::Kind;
 use crate::scene::cell::Tint;
 
-/// What is known of one object, or of one part of a cell.
+/// Ground truth of one object, or of one part of a cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObjectTruth {
-    /// Id within the image, from 1; nucleus and cytoplasm of a cell share it.
+    /// Id within the image, from 1; nucleus and cytoplasm of a cell have the same id.
     pub id: u32,
-    /// Which part of the object this row is about.
+    /// Part of the object that this row describes.
     pub part: Part,
-    /// What kind of object it is.
+    /// Kind of object.
     pub kind: Kind,
-    /// Class: of cells the class in the model, of all others the name of their kind.
+    /// Class: for cells the class of the model, for other objects the name of their kind.
     pub class: String,
-    /// Bethesda category of that class, where it has one ("NILM", "HSIL", …).
+    /// Bethesda category of the class ("NILM", "HSIL", …); empty if it has none.
     pub bethesda: String,
-    /// Variants drawn for this object.
+    /// Variants of this object.
     pub traits: Traits,
-    /// The cluster it was placed with (from 1), or 0 if it was placed alone.
+    /// Number of its cluster, from 1; 0 for a single object.
     pub cluster: u32,
-    /// Place of its middle, µm from the image's upper left corner.
+    /// Centre, µm from the upper left corner of the image.
     pub centre_um: [f64; 2],
-    /// Depth, µm; positive towards the objective, 0 in the middle of the slide.
+    /// Depth, µm; positive towards the objective, 0 at the centre of the specimen.
     pub depth_um: f64,
-    /// Strength of its stain: the mean decadic absorbance it was given, at 0.57 µm where its dyes have the amounts of a
-    /// usual stain.
-    pub stain: f64,
-    /// The tint of a cytoplasm.
+    /// Mean decadic absorbance drawn for the object, at 0.57 µm and with dye amounts of the standard stain.
+    pub mean_absorbance: f64,
+    /// Tint of a cytoplasm.
     pub tint: Option<Tint>,
-    /// Direction it was turned to, degrees.
+    /// Rotation, degrees.
     pub rotation_deg: f64,
-    /// Area of the whole object, also of what lies outside the image, µm².
+    /// Area of the complete object, including the part outside the image, µm².
     pub area_um2: f64,
-    /// Whether part of it lies outside the image.
+    /// Whether part of the object is outside the image.
     pub truncated: bool,
-    /// Its complete mask: coverage of its in-focus outline of at least one half, whatever lies over it.
+    /// Complete mask: pixels of which the in-focus outline covers at least half, including those behind other objects.
     pub amodal: Mask,
-    /// Its front-most mask: the pixels where it is nearest to the objective within its group.
-    pub front: Mask,
-    /// Distance from what is in focus in each plane, µm (`Scene::in_focus_um(plane) − depth`).
+    /// Visible mask: the pixels where the object is nearest to the objective within its group.
+    pub visible: Mask,
+    /// Defocus in each plane, µm (`Scene::in_focus_um(plane) − depth`).
     pub defocus_um: Vec<f64>,
-    /// How detectable it is in each plane: mean contrast over its mask, in units of the noise of one pixel there.
+    /// Detectability in each plane: mean contrast over its mask, relative to the noise of one pixel.
     pub detectability: Vec<f64>,
 }
 
 impl ObjectTruth {
-    /// The name of its tint, or an empty text.
+    /// Returns the name of the tint, or an empty string.
     #[must_use]
     pub fn tint_name(&self) -> &'static str {
         self.tint.map_or("", Tint::name)
     }
 
-    /// The group within which its front-most mask counts.
+    /// Returns the group within which the visible mask is computed.
     #[must_use]
     pub fn group(&self) -> Group {
         match self.part {
@@ -66,23 +65,24 @@ impl ObjectTruth {
     }
 }
 
-/// What is known of one image.
+/// Ground truth of one image.
 ///
-/// [Label maps](Self::labels) and [layers](Self::layers) follow from the masks and are made when asked for.
+/// [Label maps](Self::labels) and [overlap counts](Self::layers) are computed from the masks on demand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Truth {
     /// Columns of the image.
     pub width: usize,
     /// Rows of the image.
     pub height: usize,
-    /// One row for every object and every part of a cell, by id and part; objects without a pixel in the image are left out,
-    /// and all objects of a [layer](Kind::is_layer) share one.
+    /// One row for every object and every part of a cell, sorted by id and part. Objects without a pixel in the image
+    /// are omitted; all objects of a [layer](Kind::is_layer) share one row.
     pub objects: Vec<ObjectTruth>,
 }
 
-/// The same rows, but one for all objects of each kind that is a layer: its mask is that of all of them, its numbers
-/// are their means, its id that of the first.
-pub(crate) fn with_layers(objects: Vec<ObjectTruth>) -> Vec<ObjectTruth> {
+/// Merges the rows of each kind that is a layer into one row.
+///
+/// The merged row has the union of the masks, the means of the numbers, and the id of the first object.
+pub(crate) fn merge_layers(objects: Vec<ObjectTruth>) -> Vec<ObjectTruth> {
     let (layers, mut rows): (Vec<_>, Vec<_>) = objects.into_iter().partition(|object| object.kind.is_layer());
     for of_kind in layers.chunk_by(|a, b| a.kind == b.kind) {
         rows.extend(layer(of_kind));
@@ -101,7 +101,7 @@ fn layer(objects: &[ObjectTruth]) -> Option<ObjectTruth> {
         cluster: 0,
         centre_um: [0, 1].map(|axis| mean(&|object| object.centre_um[axis])),
         depth_um: mean(&|object| object.depth_um),
-        stain: mean(&|object| object.stain),
+        mean_absorbance: mean(&|object| object.mean_absorbance),
         rotation_deg: 0.0,
         area_um2: objects.iter().map(|object| object.area_um2).sum(),
         truncated: objects.iter().any(|object| object.truncated),

@@ -1,25 +1,25 @@
-//! Parts of objects, and the groups within which they hide each other.
+//! Parts of objects, and the groups within which objects occlude each other.
 
 use crate::words::words;
 
-/// Coverage from which on a pixel belongs to a mask.
+/// Minimum coverage of a pixel that belongs to a mask.
 pub const COVERED: f32 = 0.5;
 
-/// Which part of an object a mask belongs to.
+/// The part of an object that a mask describes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Part {
-    /// The whole cell: its cytoplasm, and the nucleus within it.
+    /// The complete cell: cytoplasm including the nucleus.
     Cytoplasm,
-    /// The nucleus of a cell. It carries the id of its cell.
+    /// The nucleus of a cell. It has the id of its cell.
     Nucleus,
-    /// An object that has no parts.
+    /// An object without parts.
     Whole,
 }
 
 words! {
-    /// The groups within which an object is nearer to the objective than another, each with a label map of its own, in the
-    /// order of these; names are those of files.
+    /// A group of objects that occlude each other. Each group has one label map, in this order; file names use these
+    /// names.
     #[derive(PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Group {
@@ -27,7 +27,7 @@ words! {
         Cytoplasm = "cytoplasm",
         /// The nuclei of cells.
         Nucleus = "nucleus",
-        /// Everything that is no epithelial cell.
+        /// Objects other than epithelial cells.
         Debris = "debris",
     }
 }

@@ -1,4 +1,4 @@
-//! Variants that the shapes of objects show.
+//! Variants of the shapes of objects.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -8,21 +8,21 @@ use serde::{Deserialize, Serialize};
 use crate::words::words;
 
 words! {
-    /// A variant that the shape of an object shows. They are written in the order in which they are listed.
+    /// A variant of the shape of an object. Files list traits in this order.
     #[derive(PartialOrd, Ord, Hash, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Trait {
-        /// Part of the cell lies flat on it.
+        /// Part of the cell is folded flat onto itself.
         Flap = "flap",
         /// Part of the cell is rolled up.
         Rolled = "rolled",
-        /// Both sides of the cell are folded to its middle.
+        /// Both sides of the cell are folded to its centre.
         Folded = "folded",
         /// The cytoplasm is cleared around the nucleus.
         Koilocytic = "koilocytic",
-        /// The cytoplasm holds keratohyalin granules.
+        /// The cytoplasm contains keratohyalin granules.
         Granular = "granular",
-        /// The nucleus is small, dark and without structure.
+        /// The nucleus is small, dark and without texture.
         Pyknotic = "pyknotic",
         /// The nucleus is wrinkled.
         Wrinkled = "wrinkled",
@@ -39,18 +39,18 @@ words! {
     }
 }
 
-/// The traits of an object. As text their names stand between semicolons, in the order of [`Trait::ALL`].
+/// The traits of an object. Written as their names, separated by semicolons, in the order of [`Trait::ALL`].
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Traits(BTreeSet<Trait>);
 
-/// A text that is not a name of a [`Trait`].
+/// Error: a string is not the name of a [`Trait`].
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("there is no trait `{}`", .0.escape_default())]
+#[error("unknown trait `{}`", .0.escape_default())]
 pub struct UnknownTrait(String);
 
 impl Traits {
-    /// Whether a trait is among them.
+    /// Whether the set contains a trait.
     #[must_use]
     pub fn contains(&self, one: Trait) -> bool {
         self.0.contains(&one)

@@ -1,4 +1,4 @@
-//! The camera as the engine uses it.
+//! Camera noise, saturation and compression in images of the engine.
 
 use papsynth::key::Key;
 use papsynth::model::Model;
@@ -7,7 +7,7 @@ use papsynth::recipe::{
 };
 use papsynth::{Engine, Frame, Inputs};
 
-/// An empty field under an even lamp.
+/// Returns a recipe for an empty field with uniform illumination.
 fn empty() -> Recipe {
     let mut recipe = Preset::Lbc.recipe();
     recipe.field.width_px = 160.0.into();
@@ -15,7 +15,7 @@ fn empty() -> Recipe {
     recipe.cells.clear();
     recipe.debris = Debris::none();
     recipe.background.illumination = Illumination::Border(Border { exponent: 0.0.into() });
-    recipe.background.scatter = 0.0.into();
+    recipe.background.texture = 0.0.into();
     recipe.background.level = 0.8.into();
     recipe
 }
@@ -24,7 +24,7 @@ fn frame(recipe: &Recipe, index: u64) -> Frame {
     Engine::new(recipe, &Model::builtin(), &Inputs::default()).unwrap().frame(Key { seed: 4, index }).unwrap()
 }
 
-/// Grey levels less those expected.
+/// Returns grey levels minus expected grey levels.
 fn noise(frame: &Frame) -> Vec<f64> {
     let plane = &frame.planes[0];
     plane.grey.iter().zip(&plane.noise_free).map(|(grey, mean)| f64::from(*grey) - f64::from(*mean)).collect()
@@ -39,7 +39,7 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
 }
 
 #[test]
-fn every_preset_has_the_noise_that_emva_1288_says() {
+fn every_preset_has_the_noise_predicted_by_emva_1288() {
     for preset in CameraPreset::ALL {
         let mut recipe = empty();
         recipe.camera = preset.camera();
@@ -54,15 +54,15 @@ fn every_preset_has_the_noise_that_emva_1288_says() {
         };
         let camera = ccd_noise::Camera::new(&params).unwrap();
         let light = (f64::from(camera.max_dn()) * 0.8 - params.offset_dn * 0.8) * camera.electrons_per_dn();
-        let [temporal, pattern] = [camera.noise_dn(light), camera.pattern_dn(light)];
+        let [temporal, pattern] = [camera.temporal_noise_dn(light), camera.nonuniformity_dn(light)];
         let expected = temporal * temporal + pattern * pattern;
-        // Four standard errors of a variance of so many pixels.
+        // Four standard errors of the variance of n pixels.
         assert!((variance / expected - 1.0).abs() < 4.0 * (2.0 / n).sqrt(), "{}: {variance} {expected}", preset.name());
     }
 }
 
 #[test]
-fn the_fixed_pattern_is_the_cameras_and_noise_is_the_images() {
+fn the_fixed_pattern_depends_on_the_camera_and_temporal_noise_on_the_image() {
     let mut recipe = empty();
     recipe.camera = CameraPreset::Orca05g.camera();
     recipe.camera.prnu = 0.03.into();
@@ -78,7 +78,7 @@ fn the_fixed_pattern_is_the_cameras_and_noise_is_the_images() {
 }
 
 #[test]
-fn saturated_pixels_are_told_with_and_without_blooming() {
+fn saturated_pixels_are_reported_with_and_without_blooming() {
     let mut recipe = empty();
     recipe.background.level = 1.0.into();
     for blooming in [0.0, 1.0] {
@@ -88,7 +88,7 @@ fn saturated_pixels_are_told_with_and_without_blooming() {
         let top = plane.grey.iter().filter(|grey| **grey == 255).count() as u64;
         assert!(plane.saturated.area() >= top && top > 1000, "{top} {}", plane.saturated.area());
         let runs = plane.saturated.runs();
-        assert!(runs.windows(2).all(|w| (w[0].y, w[0].x1) < (w[1].y, w[1].x0)), "runs are in order and apart");
+        assert!(runs.windows(2).all(|w| (w[0].y, w[0].x1) < (w[1].y, w[1].x0)), "runs are sorted and disjoint");
     }
     recipe.background.level = 0.5.into();
     assert!(frame(&recipe, 0).planes[0].saturated.is_empty());
@@ -106,31 +106,31 @@ fn jpeg_is_the_last_step() {
         recipe.camera.jpeg_quality = 60.0.into();
         let lossy = frame(&recipe, 0);
         assert_eq!(plain.planes[0].noise_free, lossy.planes[0].noise_free);
-        let spread = |frame: &Frame| noise(frame).iter().map(|v| v * v).sum::<f64>();
-        assert!(spread(&lossy) < 0.9 * spread(&plain), "it takes away fine noise");
+        let sum_of_squares = |frame: &Frame| noise(frame).iter().map(|v| v * v).sum::<f64>();
+        assert!(sum_of_squares(&lossy) < 0.9 * sum_of_squares(&plain), "compression removes fine noise");
     }
 }
 
 #[test]
-fn binning_makes_pictures_quieter() {
+fn binning_reduces_noise() {
     let mut recipe = empty();
     recipe.camera = CameraPreset::Orca05g.camera();
-    let spread = |recipe: &Recipe| {
+    let variance = |recipe: &Recipe| {
         let noise = noise(&frame(recipe, 0));
         noise.iter().map(|v| v * v).sum::<f64>() / noise.len() as f64
     };
-    let single = spread(&recipe);
+    let single = variance(&recipe);
     recipe.camera.binning_px = 2.0.into();
     for binning in [Binning::Charge, Binning::Digital] {
         recipe.camera.binning = binning;
-        let four = spread(&recipe);
+        let four = variance(&recipe);
         // Shot noise and pattern dominate: a quarter of the variance.
         assert!((four / single - 0.25).abs() < 0.05, "{binning:?}: {single} {four}");
     }
 }
 
 #[test]
-fn dark_current_lifts_the_dark_and_doubles_with_warmth() {
+fn dark_current_raises_dark_levels_and_doubles_with_temperature() {
     let mut recipe = empty();
     recipe.camera = CameraPreset::Orca05g.camera();
     recipe.camera.photon_noise = PhotonNoise::Off;

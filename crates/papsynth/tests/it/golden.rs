@@ -1,9 +1,9 @@
-//! Golden images: every stage and two whole fields, each with its recipe beside it.
+//! Golden images of every stage and of two complete fields, each with its recipe.
 //!
-//! `cargo xtask golden` runs this, `cargo xtask golden --bless` writes the images anew.
+//! `cargo xtask golden` runs this test, `cargo xtask golden --bless` rewrites the images.
 //!
-//! Tolerance: no pixel may differ by more than one grey level and no more than one in a hundred may differ at all.
-//! A routine may become faster and round differently; `fixtures/hashes.txt` tells every bit.
+//! Tolerance: no pixel may differ by more than 1 grey level, and at most 1 % of the pixels may differ. Optimised
+//! routines may round differently; `fixtures/hashes.txt` covers every bit.
 
 #![expect(clippy::cast_possible_truncation, reason = "a small program with small numbers")]
 
@@ -15,10 +15,10 @@ use papsynth::model::Model;
 use papsynth::recipe::Recipe;
 use papsynth::{Engine, Inputs};
 
-/// Largest difference of a pixel, grey levels.
-const LARGEST: u8 = 1;
-/// Largest share of pixels that may differ.
-const SHARE: f64 = 0.01;
+/// Largest accepted difference of a pixel, grey levels.
+const MAX_DIFFERENCE: u8 = 1;
+/// Largest accepted fraction of differing pixels.
+const MAX_FRACTION: f64 = 0.01;
 /// Seed of all golden images.
 const SEED: u64 = 20_150_624;
 
@@ -27,9 +27,9 @@ fn folder() -> PathBuf {
 }
 
 #[test]
-fn every_stage_looks_as_it_did() {
+fn every_stage_matches_its_golden_image() {
     let mut recipes: Vec<PathBuf> = std::fs::read_dir(folder())
-        .expect("fixtures/golden lies beside the crates")
+        .expect("fixtures/golden exists")
         .filter_map(|entry| Some(entry.ok()?.path()))
         .filter(|path| path.extension().is_some_and(|e| e == "toml"))
         .collect();
@@ -37,7 +37,7 @@ fn every_stage_looks_as_it_did() {
     assert!(recipes.len() >= 10, "golden recipes are missing");
     let bless = std::env::var_os("PAPSYNTH_BLESS").is_some();
     let failures: Vec<String> = recipes.iter().filter_map(|recipe| compare(recipe, bless).err()).collect();
-    assert!(failures.is_empty(), "{} of {} differ:\n{}", failures.len(), recipes.len(), failures.join("\n"));
+    assert!(failures.is_empty(), "{} of {} images differ:\n{}", failures.len(), recipes.len(), failures.join("\n"));
 }
 
 fn compare(recipe_path: &Path, bless: bool) -> Result<(), String> {
@@ -62,13 +62,15 @@ fn compare(recipe_path: &Path, bless: bool) -> Result<(), String> {
     }
     let expected = image::open(&golden).map_err(|e| format!("{name}: {e}"))?;
     if (expected.width(), expected.height(), expected.color()) != (width, height, colour) {
-        return Err(format!("{name}: {width} x {height} {colour:?}, not as the golden image"));
+        return Err(format!(
+            "{name}: size or colour type differs from the golden image: {width} x {height} {colour:?}"
+        ));
     }
     let expected = expected.into_bytes();
     let difference: Vec<u8> = actual.iter().zip(&expected).map(|(a, b)| a.abs_diff(*b)).collect();
     let largest = difference.iter().copied().max().unwrap_or(0);
     let differing = difference.iter().filter(|d| **d > 0).count();
-    if largest <= LARGEST && differing as f64 <= SHARE * difference.len() as f64 {
+    if largest <= MAX_DIFFERENCE && differing as f64 <= MAX_FRACTION * difference.len() as f64 {
         return Ok(());
     }
     let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("golden");
@@ -76,5 +78,5 @@ fn compare(recipe_path: &Path, bless: bool) -> Result<(), String> {
     save(&out.join(format!("{name}.actual.png")), &actual)?;
     let shown: Vec<u8> = difference.iter().map(|d| d.saturating_mul(32)).collect();
     save(&out.join(format!("{name}.difference.png")), &shown)?;
-    Err(format!("{name}: {differing} pixels differ, by up to {largest} grey levels; see {}", out.display()))
+    Err(format!("{name}: {differing} pixels differ, by at most {largest} grey levels; see {}", out.display()))
 }

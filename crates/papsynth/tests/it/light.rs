@@ -1,4 +1,4 @@
-//! Light: what the engine makes of the optics and of the stain, held against laws and against its own slower ways.
+//! Optics and stain in images of the engine, tested against physical laws and against slower reference models.
 
 #![expect(clippy::cast_possible_truncation, reason = "a small program with small numbers")]
 
@@ -13,7 +13,7 @@ use papsynth::scene::{Body, Kind};
 use papsynth::truth::Part;
 use papsynth::{Engine, Error, Frame, Inputs};
 
-/// A small field under an even lamp, without noise to speak of.
+/// Returns a recipe for a small field with uniform illumination and negligible noise.
 fn small() -> Recipe {
     let mut recipe = Preset::Lbc.recipe();
     recipe.field.width_px = 160.0.into();
@@ -24,12 +24,12 @@ fn small() -> Recipe {
         mix.count = 2.0.into();
     }
     recipe.background.illumination = Illumination::Border(Border { exponent: 0.0.into() });
-    recipe.background.scatter = 0.0.into();
+    recipe.background.texture = 0.0.into();
     recipe.camera.bits = 16.0.into();
     recipe
 }
 
-/// Nothing on the slide.
+/// Returns a recipe for an empty field.
 fn empty() -> Recipe {
     let mut recipe = small();
     recipe.cells.clear();
@@ -66,7 +66,7 @@ fn light(recipe: &Recipe) -> Vec<f32> {
     frame(recipe, 0).planes.swap_remove(0).noise_free
 }
 
-/// ‖a − b‖ / ‖white − b‖: the error relative to the contrast.
+/// Returns ‖a − b‖ / ‖white − b‖: the error relative to the contrast.
 fn error(a: &[f32], b: &[f32]) -> f64 {
     let white = f64::from(b.iter().copied().fold(0.0, f32::max));
     let square = |x: f64| x * x;
@@ -80,7 +80,7 @@ fn colour(recipe: &mut Recipe, mixing: Mixing, rendition: Rendition) {
 }
 
 #[test]
-fn an_empty_slide_is_as_bright_as_the_lamp_whatever_the_optics() {
+fn an_empty_slide_has_the_background_level_with_any_optics() {
     let mut recipe = empty();
     recipe.background.level = 0.8.into();
     let mut gaussian = recipe.clone();
@@ -92,14 +92,17 @@ fn an_empty_slide_is_as_bright_as_the_lamp_whatever_the_optics() {
         assert!(light.iter().all(|v| (v / 65_535.0 - 0.8).abs() < 1e-4), "{name}: {:?}", &light[..3]);
     }
     set(&mut recipe, |optics| *optics.stray_light = 0.2.into());
-    assert!(light(&recipe).iter().all(|v| (v / 65_535.0 - 0.8).abs() < 1e-4), "glare is light of the empty field");
+    assert!(
+        light(&recipe).iter().all(|v| (v / 65_535.0 - 0.8).abs() < 1e-4),
+        "stray light does not change the empty field"
+    );
 }
 
 #[test]
-fn products_come_near_to_light_carried_from_slab_to_slab_and_gaussians_do_not() {
+fn the_product_model_approximates_the_abbe_model_and_gaussians_do_not() {
     let mut recipe = small();
     recipe.debris.bacilli.clusters = 3.0.into();
-    // What is soft already looks alike through any optics.
+    // Soft edges look the same with any optics.
     recipe.nucleus.edge_um = 0.0.into();
     recipe.cytoplasm.rim_um = 0.0.into();
     recipe.focus.centre_um = 1.5.into();
@@ -108,12 +111,12 @@ fn products_come_near_to_light_carried_from_slab_to_slab_and_gaussians_do_not() 
     let abbe = light(&recipe);
     let off = error(&product, &abbe);
     assert!(off < 0.02, "{off}");
-    for (sigma_z, least) in [(0.25, 0.02), (1.0, 0.08)] {
-        // The paper's stage and depth are one; the same focus in the mountant.
+    for (sigma_z, min) in [(0.25, 0.02), (1.0, 0.08)] {
+        // In the paper's model, stage position equals depth; this is the same focus in the mountant.
         recipe.focus.centre_um = (1.5 * 1.515).into();
         recipe.optics = Optics::Gaussian(Gaussians { sigma_xy_um: 0.175.into(), sigma_z_um_per_um: sigma_z.into() });
         let off = error(&light(&recipe), &abbe);
-        assert!(off > least, "{sigma_z}: {off}");
+        assert!(off > min, "{sigma_z}: {off}");
     }
 }
 
@@ -128,8 +131,8 @@ fn adding_planes_never_changes_a_plane() {
         recipe.focus.planes = 5.0.into();
         recipe.focus.step_um = 3.0.into();
         let stack = frame(&recipe, 0);
-        assert_eq!(stack.planes[2].noise_free, alone.planes[0].noise_free, "the middle plane is the single one");
-        assert_eq!(stack.planes[2].grey, alone.planes[0].grey, "noise and all");
+        assert_eq!(stack.planes[2].noise_free, alone.planes[0].noise_free, "the centre plane is the single plane");
+        assert_eq!(stack.planes[2].grey, alone.planes[0].grey, "the noise is the same");
         assert_ne!(stack.planes[1].grey, stack.planes[2].grey);
         recipe.focus.planes = 9.0.into();
         let more = frame(&recipe, 0);
@@ -141,7 +144,7 @@ fn adding_planes_never_changes_a_plane() {
 }
 
 #[test]
-fn the_focus_goes_deeper_than_the_stage_by_the_mountants_index() {
+fn the_focus_moves_by_the_stage_travel_times_the_mountant_index() {
     let mut recipe = small();
     recipe.focus.planes = 21.0.into();
     recipe.focus.step_um = 0.4.into();
@@ -164,13 +167,14 @@ fn the_focus_goes_deeper_than_the_stage_by_the_mountants_index() {
         })
         .unwrap();
     let sharpest = (0..21).max_by(|a, b| roughness[*a].total_cmp(&roughness[*b])).unwrap();
-    // 3.03 µm of mountant are 2 µm of the stage for rays near the axis, five steps above the middle, and less for the rest.
+    // 3.03 µm of mountant are 2 µm of stage travel for paraxial rays, five steps above the centre, and less for other
+    // rays.
     assert!((14..=15).contains(&sharpest), "{roughness:?}");
     assert!(finished.truth.objects.iter().all(|object| object.defocus_um[15].abs() < 1e-9));
 }
 
 #[test]
-fn a_refracting_speck_is_bright_on_one_side_of_the_focus_and_dark_on_the_other() {
+fn a_refracting_speck_changes_contrast_through_focus() {
     let mut recipe = empty();
     recipe.debris.speckles.count = 1.0.into();
     recipe.debris.speckles.absorbance = 0.0.into();
@@ -183,21 +187,21 @@ fn a_refracting_speck_is_bright_on_one_side_of_the_focus_and_dark_on_the_other()
     let engine = engine(&recipe);
     let mut scene = engine.scene(Key { seed: 11, index: 0 }).unwrap();
     (scene.objects[0].depth_um, scene.objects[0].centre_um) = (0.0, [20.0, 16.0]);
-    let mut middles = Vec::new();
+    let mut contrasts = Vec::new();
     let width = scene.view.width;
     let image = |plane: &papsynth::Plane| {
         let white = plane.noise_free[0];
-        middles.push(plane.noise_free[64 * width + 80] / white - 1.0);
+        contrasts.push(plane.noise_free[64 * width + 80] / white - 1.0);
         Ok(())
     };
     engine.image::<Error>(scene, papsynth::Threads::One, image).unwrap();
-    assert!(middles[0] * middles[2] < 0.0 && middles[0].abs() > 0.03, "{middles:?}");
-    assert!((middles[0] + middles[2]).abs() < 0.3 * middles[0].abs(), "{middles:?}");
-    assert!(middles[1].abs() < 0.01, "nothing is seen in focus: {middles:?}");
+    assert!(contrasts[0] * contrasts[2] < 0.0 && contrasts[0].abs() > 0.03, "{contrasts:?}");
+    assert!((contrasts[0] + contrasts[2]).abs() < 0.3 * contrasts[0].abs(), "{contrasts:?}");
+    assert!(contrasts[1].abs() < 0.01, "it is invisible in focus: {contrasts:?}");
 }
 
 #[test]
-fn a_black_thing_is_floored_and_counted() {
+fn clipped_pixels_of_a_black_object_are_counted() {
     let mut recipe = empty();
     recipe.debris.speckles.count = 1.0.into();
     recipe.debris.speckles.absorbance = 3.0.into();
@@ -205,42 +209,42 @@ fn a_black_thing_is_floored_and_counted() {
     recipe.debris.speckles.phase_rad = 0.0.into();
     recipe.focus.centre_um = 1.5.into();
     let frame = frame(&recipe, 0);
-    assert!(frame.planes[0].floored > 0);
+    assert!(frame.planes[0].clipped_px > 0);
     assert!(frame.planes[0].noise_free.iter().all(|v| *v > 0.0 && v.is_finite()));
-    assert_eq!(self::frame(&small(), 0).planes[0].floored, 0, "cells are not so dark");
+    assert_eq!(self::frame(&small(), 0).planes[0].clipped_px, 0, "cells are not dark enough to be clipped");
 }
 
 #[test]
-fn colour_is_what_sixteen_wavelengths_make() {
+fn colour_matches_the_sum_of_sixteen_wavelengths() {
     let mut recipe = small();
     recipe.debris = empty().debris;
     colour(&mut recipe, Mixing::PerWavelength, Rendition::Raw);
     let reference = light(&recipe);
-    for (mixing, least, most) in [(Mixing::Spectral, 0.0, 0.005), (Mixing::ThreeVectors, 0.01, 0.2)] {
+    for (mixing, min, max) in [(Mixing::Spectral, 0.0, 0.005), (Mixing::ThreeVectors, 0.01, 0.2)] {
         colour(&mut recipe, mixing, Rendition::Raw);
         let off = error(&light(&recipe), &reference);
-        assert!((least..most).contains(&off), "{mixing:?}: {off}");
+        assert!((min..max).contains(&off), "{mixing:?}: {off}");
     }
 }
 
 #[test]
-fn what_is_black_stays_black_in_colour() {
+fn black_objects_stay_black_in_colour() {
     let mut recipe = small();
     recipe.stain.nucleus.haematein = 100.0;
     recipe.debris.leukocytes.clusters = 6.0.into();
     colour(&mut recipe, Mixing::Spectral, Rendition::Raw);
     let light = light(&recipe);
     let background = f64::from(light.iter().copied().fold(0.0, f32::max));
-    let neon = light.chunks_exact(3).filter(|pixel| {
+    let saturated_colours = light.chunks_exact(3).filter(|pixel| {
         let [low, high] = [pixel.iter().copied().fold(f32::MAX, f32::min), pixel.iter().copied().fold(0.0, f32::max)];
         f64::from(high - low) > 0.8 * background
     });
-    assert_eq!(neon.count(), 0);
+    assert_eq!(saturated_colours.count(), 0);
 }
 
 #[test]
-fn one_wavelength_of_the_sixteen_is_the_monochrome_image() {
-    // The weighted sum over the lamp's and the sensor's nodes, one monochrome image each.
+fn per_wavelength_colour_is_the_weighted_sum_of_monochrome_images() {
+    // One monochrome image for each wavelength node of lamp and sensor.
     let mut recipe = small();
     recipe.debris = empty().debris;
     recipe.light = Light::Colour(Colour {
@@ -294,9 +298,9 @@ fn cytoplasm_takes_the_tint_of_its_dyes() {
 }
 
 #[test]
-fn fields_of_one_slide_share_its_stain() {
+fn fields_of_one_slide_have_the_same_stain() {
     let mut recipe = small();
-    recipe.slide.fields = 4;
+    recipe.slide.fields_per_slide = 4;
     recipe.stain.field_balance = 0.0.into();
     recipe.stain.slide_balance = 0.5.into();
     let engine = engine(&recipe);
@@ -346,7 +350,7 @@ fn nuclei_stand_out_most_near_the_papers_filter() {
 }
 
 #[test]
-fn further_spread_and_a_wider_condenser_do_what_they_say() {
+fn extra_blur_and_a_wider_condenser_reduce_contrast() {
     let roughness = |recipe: &Recipe| {
         let light = light(recipe);
         light.windows(2).map(|w| f64::from(w[1] - w[0]) * f64::from(w[1] - w[0])).sum::<f64>()
@@ -355,7 +359,7 @@ fn further_spread_and_a_wider_condenser_do_what_they_say() {
     let mut softer = recipe.clone();
     set(&mut softer, |optics| *optics.extra_blur_um = 0.4.into());
     assert!(roughness(&softer) < 0.8 * roughness(&recipe));
-    // Out of focus, the cone of the condenser is the blur.
+    // Out of focus, the cone of the condenser determines the blur.
     let mut out = recipe;
     out.focus.centre_um = 6.0.into();
     let mut wide = out.clone();
@@ -364,7 +368,7 @@ fn further_spread_and_a_wider_condenser_do_what_they_say() {
 }
 
 #[test]
-fn apertures_beyond_their_medium_are_refused_by_name() {
+fn invalid_apertures_are_reported_with_their_field() {
     let problems = |change: &dyn Fn(&mut Recipe)| {
         let mut recipe = small();
         change(&mut recipe);
@@ -392,7 +396,7 @@ fn apertures_beyond_their_medium_are_refused_by_name() {
     assert!(text.contains("light.kind") && text.contains("bright-field"), "{text}");
     let text = problems(&|recipe| set(recipe, |optics| *optics.mount_index = 0.9.into()));
     assert!(text.contains("optics.mount_index"), "{text}");
-    // A condenser wider than the objective is legitimate, and it is said.
+    // A condenser wider than the objective is accepted with a note.
     let mut recipe = small();
     assert!(recipe.notes().is_empty());
     set(&mut recipe, |optics| *optics.condenser_na = 1.2.into());
@@ -403,7 +407,7 @@ fn apertures_beyond_their_medium_are_refused_by_name() {
 }
 
 #[test]
-fn magnification_and_sensor_make_the_pixel() {
+fn pixel_size_follows_from_magnification_and_sensor() {
     let mut recipe = empty();
     recipe.field.magnification = (40.0 * 0.645).into();
     let pixel = |recipe: &Recipe| engine(recipe).scene(Key { seed: 1, index: 0 }).unwrap().view.pixel_um;
@@ -413,7 +417,7 @@ fn magnification_and_sensor_make_the_pixel() {
 }
 
 #[test]
-fn specks_of_either_form_have_the_size_they_were_given() {
+fn specks_of_both_forms_have_the_specified_size() {
     let mut recipe = empty();
     recipe.debris.speckles.count = 30.0.into();
     recipe.debris.speckles.dilations =
@@ -425,7 +429,7 @@ fn specks_of_either_form_have_the_size_they_were_given() {
         let inside: Vec<_> = specks.collect();
         assert!(inside.len() >= 15, "{form:?}: {} specks", inside.len());
         for speck in inside {
-            // A capsule of radius 2.5 px and length 1, or two diamonds of 13 px side by side.
+            // A capsule of radius 2.5 px and length 1 px, or two adjacent diamonds of 13 px.
             let expected = match form {
                 papsynth::recipe::SpeckForm::Round => 24.6,
                 papsynth::recipe::SpeckForm::Dilated => 18.0,
@@ -447,7 +451,7 @@ fn specks_of_either_form_have_the_size_they_were_given() {
 fn nuclei_from_images_are_not_blurred_twice() {
     let mut model = Model::builtin();
     let class = model.classes.get_mut("intermediate").unwrap();
-    // A donor of fine stripes, as a microscope has shown them.
+    // An imaged donor with fine stripes.
     let width = 48;
     let stripes = |i: usize| 300 + if i % width % 4 < 2 { 60 } else { 0 };
     class.nucleus.donors = vec![papsynth::model::Donor {

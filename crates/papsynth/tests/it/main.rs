@@ -1,6 +1,7 @@
 //! Integration tests, linked as one program.
 
 mod camera;
+mod density;
 mod golden;
 mod light;
 mod same_bytes;

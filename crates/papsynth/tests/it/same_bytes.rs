@@ -1,4 +1,4 @@
-//! Recipe, model, seed and index determine an image: whatever the threads, the order, or what else is on the slide.
+//! Recipe, model, seed and index determine an image, independent of threads, order, and other objects on the slide.
 
 #![expect(clippy::cast_possible_truncation, reason = "a small program with small numbers")]
 
@@ -14,7 +14,7 @@ fn small(preset: Preset) -> Recipe {
     recipe.field.width_px = Number::Fixed(220.0);
     recipe.field.height_px = Number::Fixed(180.0);
     for mix in recipe.cells.values_mut() {
-        mix.count = Number::uniform(1.0, 3.0);
+        mix.count = Number::uniform(1.0, 3.0).into();
     }
     if let Layout::Clusters(Clusters { radius_um, .. }) = &mut recipe.layout {
         *radius_um = Number::Fixed(15.0);
@@ -58,17 +58,17 @@ fn threads_and_order_change_nothing() {
             }
         }
         let alone = frame(&self::engine(&small(preset)), 1, Threads::One);
-        assert_same(&forwards[1], &alone, &format!("{}: the second alone", preset.name()));
+        assert_same(&forwards[1], &alone, &format!("{}: the second frame alone", preset.name()));
     }
 }
 
 #[test]
-fn another_speckle_moves_no_nucleus() {
+fn adding_a_speckle_changes_no_other_object() {
     let mut recipe = small(Preset::Lbc);
-    recipe.debris.speckles.count = Number::Fixed(5.0);
-    recipe.debris.out_of_focus.count = Number::Fixed(0.0);
+    recipe.debris.speckles.count = Number::Fixed(5.0).into();
+    recipe.debris.out_of_focus.count = Number::Fixed(0.0).into();
     let few = frame(&engine(&recipe), 0, Threads::One);
-    recipe.debris.speckles.count = Number::Fixed(6.0);
+    recipe.debris.speckles.count = Number::Fixed(6.0).into();
     let more = frame(&engine(&recipe), 0, Threads::One);
     let others = |frame: &Frame| {
         frame
@@ -77,7 +77,7 @@ fn another_speckle_moves_no_nucleus() {
             .objects
             .iter()
             .filter(|o| o.kind != Kind::Speckle)
-            // Ids follow the kinds; all else stays.
+            // Ids depend on the number of objects of other kinds.
             .map(|o| (o.kind, o.part, o.amodal.clone()))
             .collect::<Vec<_>>()
     };
@@ -89,7 +89,7 @@ fn another_speckle_moves_no_nucleus() {
 }
 
 #[test]
-fn a_distribution_elsewhere_moves_nothing() {
+fn a_distribution_of_a_camera_parameter_changes_no_object() {
     let mut recipe = small(Preset::Lbc);
     let before = engine(&recipe).scene(Key { seed: 5, index: 0 }).unwrap();
     recipe.camera.read_noise_e = Number::uniform(5.0, 9.0);
@@ -100,7 +100,7 @@ fn a_distribution_elsewhere_moves_nothing() {
 }
 
 #[test]
-fn truth_holds_together() {
+fn ground_truth_is_consistent() {
     let mut recipe = small(Preset::HighGrade);
     recipe.focus.planes = Number::Fixed(3.0);
     let frame = frame(&engine(&recipe), 1, Threads::All);
@@ -113,14 +113,17 @@ fn truth_holds_together() {
         assert_eq!(object.detectability.len(), 3);
         assert_eq!(object.defocus_um.len(), 3);
         let labels = &labels[Group::ALL.iter().position(|group| *group == object.group()).unwrap()];
-        assert!(object.front.pixels(width).all(|p| labels.ids[p] == object.id));
+        assert!(object.visible.pixels(width).all(|p| labels.ids[p] == object.id));
         let inside: std::collections::BTreeSet<usize> = object.amodal.pixels(width).collect();
-        assert!(object.front.pixels(width).all(|p| inside.contains(&p)), "what shows is part of the whole");
+        assert!(
+            object.visible.pixels(width).all(|p| inside.contains(&p)),
+            "the visible mask is inside the complete mask"
+        );
         if !object.truncated {
             let px = object.area_um2 / (0.25 * 0.25);
-            let slack = 0.05 * px + 12.0;
+            let tolerance = 0.05 * px + 12.0;
             assert!(
-                (object.amodal.area() as f64 - px).abs() < slack,
+                (object.amodal.area() as f64 - px).abs() < tolerance,
                 "{:?} {}: {px} {}",
                 object.kind,
                 object.id,
@@ -131,23 +134,23 @@ fn truth_holds_together() {
     let cells: Vec<_> = truth.objects.iter().filter(|o| o.part == Part::Cytoplasm).collect();
     for nucleus in truth.objects.iter().filter(|o| o.part == Part::Nucleus) {
         let cell = cells.iter().find(|cell| cell.id == nucleus.id);
-        assert!(cell.is_some(), "a nucleus shares the id of its cell");
+        assert!(cell.is_some(), "a nucleus has the id of its cell");
     }
     let covered = truth.layers().iter().map(|&l| u64::from(l)).sum::<u64>();
     assert_eq!(covered, cells.iter().map(|c| c.amodal.area()).sum::<u64>());
-    for object in truth.objects.iter().filter(|o| o.stain > 0.1 && o.amodal.area() > 20) {
-        assert!(object.detectability.iter().all(|d| *d > 0.0), "{:?} darkens what lies behind it", object.kind);
+    for object in truth.objects.iter().filter(|o| o.mean_absorbance > 0.1 && o.amodal.area() > 20) {
+        assert!(object.detectability.iter().all(|d| *d > 0.0), "{:?} darkens the image", object.kind);
     }
 }
 
 #[test]
-fn focus_moves_blur_between_planes_and_keeps_the_noise_free_mean() {
+fn planes_out_of_focus_are_blurred() {
     let mut recipe = small(Preset::Sparse);
     recipe.focus.planes = Number::Fixed(9.0);
     recipe.focus.step_um = Number::Fixed(2.0);
     recipe.slide.depth_um = Number::Fixed(0.0);
     recipe.slide.stacking_um = Number::Fixed(0.0);
-    recipe.debris.out_of_focus.count = Number::Fixed(0.0);
+    recipe.debris.out_of_focus.count = Number::Fixed(0.0).into();
     let frame = frame(&engine(&recipe), 2, Threads::One);
     let roughness: Vec<f64> = frame
         .planes
@@ -162,21 +165,12 @@ fn focus_moves_blur_between_planes_and_keeps_the_noise_free_mean() {
         })
         .collect();
     let sharpest = (0..9).max_by(|a, b| roughness[*a].total_cmp(&roughness[*b])).unwrap();
-    assert_eq!(sharpest, 4, "everything lies at depth zero: {roughness:?}");
+    assert_eq!(sharpest, 4, "all objects are at depth 0: {roughness:?}");
     assert!(roughness[0] < 0.8 * roughness[4] && roughness[8] < 0.8 * roughness[4]);
 }
 
 #[test]
-fn more_cells_than_fit_is_an_error_before_the_search() {
-    let mut recipe = small(Preset::Sparse);
-    recipe.slide.spacing_um = Number::Fixed(30.0);
-    recipe.cells.get_mut("intermediate").unwrap().count = Number::Fixed(500.0);
-    let message = engine(&recipe).scene(Key { seed: 1, index: 0 }).unwrap_err().to_string();
-    assert!(message.contains("do not fit") && message.contains("slide.spacing_um"), "{message}");
-}
-
-#[test]
-fn an_unknown_class_is_named_with_those_there_are() {
+fn an_unknown_class_is_reported_with_the_known_classes() {
     let mut recipe = small(Preset::Sparse);
     let mix = recipe.cells["intermediate"].clone();
     recipe.cells.insert("intermedate".to_owned(), mix);

@@ -1,4 +1,4 @@
-//! Scenes that were edited, or made by another program.
+//! Scenes that were edited or written by another program.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +9,7 @@ use papsynth::scene::Scene;
 use papsynth::{Engine, Error, Frame, Inputs, Threads};
 use serde_json::Value;
 
-/// A small field of large pixels.
+/// Returns a recipe for a small field with large pixels.
 fn small(preset: Preset) -> Recipe {
     let mut recipe = preset.recipe();
     (recipe.field.width_px, recipe.field.height_px) = (48.into(), 40.into());
@@ -36,7 +36,7 @@ fn image(engine: &Engine, scene: Scene) -> Result<Frame, Error> {
 }
 
 #[test]
-fn a_scene_that_was_written_and_read_gives_the_same_image() {
+fn a_scene_read_from_json_gives_the_same_image() {
     for preset in [Preset::Lbc, Preset::Paper2015, Preset::HighGrade] {
         let engine = engine(preset);
         let scene = engine.scene(Key { seed: 3, index: 2 }).unwrap();
@@ -48,7 +48,7 @@ fn a_scene_that_was_written_and_read_gives_the_same_image() {
 }
 
 #[test]
-fn no_number_of_a_scene_stops_the_engine() {
+fn no_number_in_a_scene_makes_the_engine_panic() {
     let engine = engine(Preset::Inflamed);
     let read = |index| serde_json::from_str(&engine.scene(Key { seed: 3, index }).unwrap().to_json()).unwrap();
     // One object of each kind.
@@ -68,7 +68,7 @@ fn no_number_of_a_scene_stops_the_engine() {
         }
     }
     for pointer in numbers(&value, "").into_iter().filter(|pointer| !pointer.starts_with("/objects")) {
-        // Fields of thousands of pixels take long.
+        // Large fields are slow.
         if !pointer.starts_with("/view") {
             imaged += try_all(&engine, &mut value, &pointer);
         }
@@ -76,7 +76,7 @@ fn no_number_of_a_scene_stops_the_engine() {
     assert!(imaged > 300, "{imaged}");
 }
 
-/// Places of all numbers in a value.
+/// Returns JSON pointers to all numbers in a value.
 fn numbers(value: &Value, path: &str) -> Vec<String> {
     match value {
         Value::Object(fields) => fields.iter().flat_map(|(name, v)| numbers(v, &format!("{path}/{name}"))).collect(),
@@ -88,7 +88,8 @@ fn numbers(value: &Value, path: &str) -> Vec<String> {
     }
 }
 
-/// Images a scene with some numbers in one place: each is refused or imaged. Returns how many were read.
+/// Images a scene with several values of one number; each is rejected or imaged. Returns how many scenes were valid
+/// JSON.
 fn try_all(engine: &Engine, value: &mut Value, pointer: &str) -> usize {
     let before = value.pointer(pointer).unwrap().clone();
     let mut read = 0;

@@ -1,12 +1,12 @@
-//! Whole slides: no seam, no dependence on tiles, frames, order or the slide's size.
+//! Complete slides: no seams, and no dependence on tiles, frames, order or slide size.
 
 use papsynth::model::Model;
-use papsynth::recipe::{Bowl, Colour, Illumination, Light, Preset, Recipe};
+use papsynth::recipe::{Colour, Illumination, Light, Preset, Quadratic, Recipe};
 use papsynth::slide::SlidePart;
 use papsynth::truth::Part;
 use papsynth::{Engine, Inputs, Threads};
 
-/// A slide that is full of everything from its first pixel on.
+/// Returns a recipe for a slide with objects of all kinds everywhere.
 fn recipe() -> Recipe {
     let mut recipe = Preset::Inflamed.recipe();
     (recipe.scan.width_px, recipe.scan.height_px, recipe.scan.frame_px) = (900, 700, 256);
@@ -14,10 +14,10 @@ fn recipe() -> Recipe {
     recipe
 }
 
-/// A slide whose frames are lit alike all over, so that they differ in their noise alone.
-fn even(mut recipe: Recipe) -> Recipe {
+/// Sets uniform illumination, so that frames differ only in noise.
+fn uniformly_lit(mut recipe: Recipe) -> Recipe {
     recipe.background.illumination =
-        Illumination::Bowl(Bowl { x2: 0.0.into(), y2: 0.0.into(), off_centre: 0.0.into() });
+        Illumination::Quadratic(Quadratic { falloff_x: 0.into(), falloff_y: 0.into(), centre_offset: 0.into() });
     recipe
 }
 
@@ -29,14 +29,14 @@ fn part(engine: &Engine, origin: [u32; 2], size: [u32; 2]) -> SlidePart {
     engine.slide(5, 0).unwrap().part(origin, size, Threads::One).unwrap()
 }
 
-fn is_same(a: &SlidePart, b: &SlidePart) {
+fn assert_same(a: &SlidePart, b: &SlidePart) {
     assert!(a.planes == b.planes, "pixels differ");
     assert_eq!(a.labels, b.labels);
     assert_eq!(a.layers, b.layers);
     assert_eq!(a.objects, b.objects);
 }
 
-/// The largest difference of noise-free grey levels.
+/// Returns the largest difference of noise-free grey levels.
 fn difference(a: &SlidePart, b: &SlidePart) -> f32 {
     let pairs = a.planes.iter().zip(&b.planes).flat_map(|(a, b)| a.noise_free.iter().zip(&b.noise_free));
     pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
@@ -57,7 +57,7 @@ fn frames_join_without_a_seam() {
     paper.layout = papsynth::recipe::Layout::Uniform {};
     paper.scan = recipe().scan;
     for (name, recipe) in [("default", recipe()), ("colour", colour), ("stack", stack), ("paper", paper)] {
-        let mut recipe = even(recipe);
+        let mut recipe = uniformly_lit(recipe);
         let size = [500, 400];
         let small = part(&engine(&recipe), [100, 90], size);
         recipe.scan.frame_px = 1024;
@@ -74,7 +74,7 @@ fn frames_join_without_a_seam() {
 }
 
 #[test]
-fn a_part_is_that_part_whatever_its_size_and_the_slides() {
+fn a_part_does_not_depend_on_its_size_or_the_slide_size() {
     let recipe = recipe();
     let engine = engine(&recipe);
     let whole = part(&engine, [0, 0], [900, 700]);
@@ -93,9 +93,11 @@ fn a_part_is_that_part_whatever_its_size_and_the_slides() {
     assert_eq!(of_larger.labels, of_smaller.labels);
 }
 
-/// Random windows, each put together from tiles of one of three sizes, in any order: as many as `PAPSYNTH_WINDOWS` says.
+/// Compares random windows, assembled from tiles of three sizes, with the complete slide.
+///
+/// The environment variable `PAPSYNTH_WINDOWS` sets the number of windows.
 #[test]
-fn windows_of_tiles_are_that_part() {
+fn windows_of_tiles_match_the_complete_slide() {
     const TILES_PX: [u32; 3] = [61, 128, 300];
     let count: u64 = std::env::var("PAPSYNTH_WINDOWS").ok().and_then(|n| n.parse().ok()).unwrap_or(6);
     let mut recipe = recipe();
@@ -146,13 +148,13 @@ fn threads_and_order_change_nothing() {
     let slide = engine.slide(5, 0).unwrap();
     slide.frame([3, 2], Threads::All).unwrap();
     slide.frame([0, 0], Threads::All).unwrap();
-    is_same(&one, &slide.frame([1, 1], Threads::All).unwrap());
+    assert_same(&one, &slide.frame([1, 1], Threads::All).unwrap());
     let other = engine.slide(5, 1).unwrap().frame([1, 1], Threads::All).unwrap();
     assert!(one.planes != other.planes, "another slide");
 }
 
 #[test]
-fn every_object_is_told_once_and_its_mask_is_what_labels_show() {
+fn every_object_has_one_row_and_its_mask_matches_the_labels() {
     let recipe = recipe();
     let engine = engine(&recipe);
     let slide = engine.slide(5, 0).unwrap();
@@ -164,12 +166,12 @@ fn every_object_is_told_once_and_its_mask_is_what_labels_show() {
         }
     }
     let mut ids: Vec<_> = rows.iter().map(|row| (row.id, row.part)).collect();
-    let told = ids.len();
+    let rows_found = ids.len();
     ids.sort_unstable();
     ids.dedup();
-    assert_eq!(ids.len(), told, "an object is told twice");
-    assert!(told > 100, "{told}");
-    // Objects whose middle lies beyond the slide are seen and not told; all others make up the layers.
+    assert_eq!(ids.len(), rows_found, "an object has two rows");
+    assert!(rows_found > 100, "{rows_found}");
+    // Objects centred outside the slide are visible but have no row; the layers are compared away from the border.
     for row in rows.iter().filter(|row| row.part == Part::Cytoplasm) {
         row.amodal.pixels(900).for_each(|pixel| layers[pixel] += 1);
     }
@@ -183,10 +185,10 @@ fn every_object_is_told_once_and_its_mask_is_what_labels_show() {
 }
 
 #[test]
-fn density_is_that_of_fields_within_the_deposit_and_falls_beyond_it() {
+fn density_matches_fields_inside_the_deposit_and_is_lower_outside() {
     let mut recipe = Preset::Lbc.recipe();
     (recipe.scan.width_px, recipe.scan.height_px) = (60_000, 60_000);
-    recipe.scan.deposit.unevenness = 0.0.into();
+    recipe.scan.deposit.density_variation = 0.0.into();
     let engine = engine(&recipe);
     let count = |slide: &papsynth::Slide<'_>, origin, size: u32| {
         let found = slide.objects(origin, [size; 2]).unwrap();
@@ -204,7 +206,7 @@ fn density_is_that_of_fields_within_the_deposit_and_falls_beyond_it() {
         inside += count(&slide, [24_000, 26_000], side) / 3.0;
         beyond += count(&slide, [0, 0], 4000) / 3.0;
     }
-    // Some that reach in from beyond are counted too.
+    // The count includes objects that extend into the region from outside.
     let found = inside / (f64::from(side + 300) * f64::from(side + 300));
     assert!((found / wanted - 1.0).abs() < 0.2, "{found} {wanted}");
     assert!(beyond / f64::from(4300 * 4300) < 0.05 * wanted, "{beyond}");

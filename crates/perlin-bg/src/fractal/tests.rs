@@ -9,7 +9,7 @@ fn fractal(octaves: usize, persistence: f64) -> Fractal {
 }
 
 #[test]
-fn one_octave_is_perlin() {
+fn one_octave_equals_perlin() {
     let perlin = Perlin::new(&PerlinParams::default(), KEY).unwrap();
     let noise = fractal(1, 0.5);
     for i in 0..500 {
@@ -20,7 +20,7 @@ fn one_octave_is_perlin() {
 }
 
 #[test]
-fn an_image_has_the_bits_of_its_points() {
+fn images_match_points_bit_for_bit() {
     let noise = fractal(5, 0.6);
     let window = Window { origin: [-3.3, 8.8], ..Window::with_cell_px(37.0) };
     let (width, height) = (83, 59);
@@ -48,8 +48,8 @@ fn bound_is_the_sum_of_amplitudes() {
 }
 
 #[test]
-fn the_spectrum_falls_as_persistence_says() {
-    // Structure function E|n(x + d) - n(x)|² of noise with power f^-(2H+2) grows as d^2H within its octaves.
+fn spectrum_falls_with_persistence() {
+    // Structure function E|n(x + d) - n(x)|² of noise with power f^-(2H+2): it grows as d^2H within its octaves.
     let growth = |persistence: f64| {
         let noise = fractal(10, persistence);
         let mean_square = |distance: f64| {
@@ -60,7 +60,7 @@ fn the_spectrum_falls_as_persistence_says() {
             });
             squares.sum::<f64>() / 40_000.0
         };
-        // Over three octaves well within the ten.
+        // Fitted over three of the ten octaves.
         libm::log2(mean_square(1.0 / 8.0) / mean_square(1.0 / 64.0)) / 3.0
     };
     for (persistence, twice_hurst) in [(0.75, 0.830), (0.85, 0.469)] {
@@ -87,7 +87,7 @@ fn every_option_changes_the_noise() {
 }
 
 #[test]
-fn parameters_out_of_range_are_named() {
+fn out_of_range_values_are_rejected_by_field() {
     let base = FractalParams::default();
     let cases = [
         ("octaves", FractalParams { octaves: 0, ..base.clone() }),

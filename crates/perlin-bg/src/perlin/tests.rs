@@ -17,7 +17,7 @@ fn with_fade(fade: Fade, key: u64) -> Perlin {
 
 fn sampled(noise: &Perlin, side: usize, cell_px: f64) -> Vec<f32> {
     let mut image = vec![0.0; side * side];
-    // Half a pixel off the lattice, so that samples lie evenly in a cell.
+    // Half a pixel off the lattice, so that samples are equidistant in a cell.
     let window = Window { origin: [0.5 / cell_px; 2], ..Window::with_cell_px(cell_px) };
     noise.add_into(&mut image, side, &window, 1.0);
     image
@@ -37,7 +37,7 @@ fn positions(count: usize, range: f64) -> Vec<[f64; 2]> {
 }
 
 #[test]
-fn zero_on_the_lattice() {
+fn noise_is_zero_on_the_lattice() {
     for fade in [Fade::Cubic, Fade::Quintic] {
         let noise = with_fade(fade, 3);
         for i in -20..20 {
@@ -49,7 +49,7 @@ fn zero_on_the_lattice() {
 }
 
 #[test]
-fn stays_within_its_bound_and_comes_near_it() {
+fn noise_stays_within_its_bound_and_approaches_it() {
     for fade in [Fade::Cubic, Fade::Quintic] {
         let noise = with_fade(fade, SEED);
         let largest = sampled(&noise, 2048, 8.0).iter().fold(0.0f32, |largest, v| largest.max(v.abs()));
@@ -59,7 +59,7 @@ fn stays_within_its_bound_and_comes_near_it() {
 }
 
 #[test]
-fn agrees_with_the_textbook() {
+fn noise_matches_the_textbook() {
     // Perlin 1985 in double precision: four ramps, blended along x, then along y.
     let oracle = |noise: &Perlin, x: f64, y: f64| {
         let (i, j) = (x.floor(), y.floor());
@@ -79,7 +79,7 @@ fn agrees_with_the_textbook() {
     };
     for fade in [Fade::Cubic, Fade::Quintic] {
         let noise = with_fade(fade, 11);
-        // Far from the origin as well.
+        // Also far from the origin.
         for corner in [0.0, (1i64 << 36) as f64] {
             for [x, y] in positions(10_000, 500.0).into_iter().map(|p| p.map(|at| corner + at)) {
                 let error = f64::from(noise.at(x, y)) - oracle(&noise, x, y);
@@ -90,7 +90,7 @@ fn agrees_with_the_textbook() {
 }
 
 #[test]
-fn a_row_has_the_bits_of_its_points() {
+fn rows_match_points_bit_for_bit() {
     let noise = quintic();
     for (cell_px, origin) in [(64.0, [0.0, 0.0]), (7.3, [-4.2, 1e6]), (0.4, [3.1, -2.7]), (-5.0, [0.0, 0.25])] {
         let window = Window { origin, ..Window::with_cell_px(cell_px) };
@@ -107,10 +107,10 @@ fn a_row_has_the_bits_of_its_points() {
 }
 
 #[test]
-fn tiles_agree_with_the_whole() {
+fn tiles_match_the_complete_image() {
     let noise = quintic();
     let plane = Window { origin: [0.123, -9.7], ..Window::with_cell_px(13.7) };
-    // Far away on a slide of 10^10 pixels, where a tile of f32 coordinates would have lost its place.
+    // A tile on a slide of 10^10 pixels, beyond the precision of f32 coordinates.
     for corner in [[0, 0], [-70, 12_345], [10_000_000_000, 9_999_999_999]] {
         let (width, height) = (96, 60);
         let mut whole = vec![0.0; width * height];
@@ -128,8 +128,8 @@ fn tiles_agree_with_the_whole() {
 }
 
 #[test]
-fn variance_is_that_of_unit_gradients() {
-    // 256 x 256 cells of correlation about one cell: standard error of the variance about 0.6 %.
+fn variance_matches_unit_gradients() {
+    // 256 x 256 cells with a correlation length of about one cell: the standard error of the variance is about 0.6 %.
     for (fade, expected) in [(Fade::Cubic, 0.0444), (Fade::Quintic, 0.0462)] {
         let found = variance(&sampled(&with_fade(fade, SEED), 2048, 8.0));
         assert!((found / expected - 1.0).abs() < 0.03, "{fade:?}: {found}");
@@ -137,8 +137,8 @@ fn variance_is_that_of_unit_gradients() {
 }
 
 #[test]
-fn gradients_have_even_moments_and_know_nothing_of_each_other() {
-    // With the blending, these moments fix the spectrum: any three even directions or more have the same.
+fn gradients_are_isotropic_and_independent() {
+    // Fade curve and these moments determine the spectrum: it is the same for any three or more equidistant directions.
     const SIDE: i64 = 200;
     for gradients in [3, 8, 256] {
         let params = PerlinParams { gradients, ..PerlinParams::default() };
@@ -147,7 +147,8 @@ fn gradients_have_even_moments_and_know_nothing_of_each_other() {
             let sums = (0..SIDE).map(|j| (0..SIDE).map(|i| f64::from(of(i - 50, j - 90))).sum::<f64>());
             sums.sum::<f64>() / (SIDE * SIDE) as f64
         };
-        // Standard errors of means of 40 000: 0.0035 of gradients, 0.0018 of products within one, 0.0025 of two; bounds 4 of them.
+        // Standard errors of means of 40 000 values: 0.0035 of gradients, 0.0018 of products within a gradient, 0.0025
+        // of two gradients. The bounds are four standard errors.
         for axis in [0, 1] {
             let square = mean(&|i, j| noise.gradient([i, j])[axis] * noise.gradient([i, j])[axis]);
             assert!((square - 0.5).abs() < 0.0072, "{gradients}: {square}");
@@ -173,15 +174,15 @@ fn gradients_have_even_moments_and_know_nothing_of_each_other() {
 }
 
 #[test]
-fn bits_are_the_same_everywhere() {
-    // Recorded once; a change here changes every image made from a seed.
+fn bits_are_pinned() {
+    // A change of these bits changes every image generated from a seed.
     let noise = quintic();
     let bits = [[0.5, 0.5], [-3.25, 17.75], [1e9 + 0.125, -1e9 - 0.375]].map(|[x, y]| noise.at(x, y).to_bits());
     assert_eq!(bits, [3_202_643_538, 1_051_042_590, 973_699_328]);
 }
 
 #[test]
-fn parameters_out_of_range_are_named() {
+fn out_of_range_values_are_rejected_by_field() {
     for gradients in [0, 1, 2, (1 << 16) + 1, usize::MAX] {
         let params = PerlinParams { gradients, ..PerlinParams::default() };
         let message = Perlin::new(&params, 0).unwrap_err().to_string();
@@ -190,7 +191,7 @@ fn parameters_out_of_range_are_named() {
 }
 
 #[test]
-fn positions_that_are_not_finite_give_nan() {
+fn non_finite_positions_give_nan() {
     let noise = quintic();
     assert!(noise.at(f64::NAN, 0.0).is_nan());
     assert!(noise.at(0.0, f64::INFINITY).is_nan());
@@ -199,7 +200,7 @@ fn positions_that_are_not_finite_give_nan() {
 }
 
 #[test]
-#[should_panic(expected = "width 7 must divide the image's 20 pixels")]
-fn a_width_that_does_not_divide_panics() {
+#[should_panic(expected = "20 pixels are not a multiple of the width, 7")]
+fn incomplete_rows_panic() {
     quintic().add_into(&mut [0.0; 20], 7, &Window::default(), 1.0);
 }

@@ -1,20 +1,20 @@
-//! What Hugging Face wants to be told of a table: which bytes are images, which numbers are classes.
+//! Features of Hugging Face tables: the types of columns, such as images and class labels.
 
 use crate::truth::{Head, Kind};
 
-/// The column of integers that stand for the classes of the data set, counted from 0.
+/// The column with the class labels of the data set, numbers from 0.
 pub(super) const CLASS: &str = "category";
 
-/// An image as Hugging Face keeps it: the bytes of its file, and the name that file would have.
+/// An image of Hugging Face: the bytes of the file and a file name.
 pub(super) const IMAGE: Kind =
     Kind::Struct(&[Head::new("bytes", Kind::Bytes).or_null(), Head::new("path", Kind::Text).or_null()]);
 
-/// The text of the key `huggingface` of a file: features by name, in the order of the columns.
+/// Returns the metadata value for the key `huggingface`: the features, in the order of the columns.
 pub(super) fn metadata(columns: &[Head], classes: &[String]) -> String {
     format!("{{\"info\": {{\"features\": {}}}}}", object(columns, classes))
 }
 
-/// A text as JSON, which YAML is, too.
+/// Returns a string in JSON, which is also YAML.
 fn quoted(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }
@@ -24,7 +24,7 @@ fn object(columns: &[Head], classes: &[String]) -> String {
     format!("{{{}}}", each.collect::<Vec<_>>().join(", "))
 }
 
-/// As JSON. Lists are told in a way that old and new releases of `datasets` know.
+/// Returns a feature as JSON. The notation of lists is valid for old and new releases of `datasets`.
 fn feature(column: &Head, classes: &[String]) -> String {
     match column.kind {
         IMAGE => "{\"_type\": \"Image\"}".to_owned(),
@@ -51,12 +51,12 @@ fn dtype(kind: Kind) -> &'static str {
         Kind::Whole => "int64",
         Kind::Number => "float64",
         Kind::Text => "string",
-        // Lists and structs have no name of one word.
+        // Lists and structs are handled by the callers.
         Kind::Bytes | Kind::List(_) | Kind::Struct(_) => "binary",
     }
 }
 
-/// The same as the card wants it: a list of features with their names.
+/// Returns the features for the dataset card: a list with names.
 pub(super) fn yaml(columns: &[Head], classes: &[String]) -> String {
     let each = columns.iter().map(|column| {
         let (key, what) = entry(column.name, column.kind, classes);

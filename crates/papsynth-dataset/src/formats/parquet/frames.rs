@@ -1,4 +1,4 @@
-//! The frames of the format `huggingface`: a row each, in a file for each split of a shard.
+//! Frames of the format `huggingface`: a row for each, in a file for each split of a shard.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -19,12 +19,13 @@ use super::features::{CLASS, IMAGE, metadata, yaml};
 use super::writer::{Writer, failed};
 use crate::error::{Error, Problem};
 use crate::files::Pending;
-use crate::formats::names::{HUGGINGFACE_CARD, PICTURE, PLANES, huggingface_file, huggingface_split, numbered};
+use crate::formats::depth::{Depth, to_training};
+use crate::formats::names::{HUGGINGFACE_CARD, IMAGE as FILE, PLANES, huggingface_file, huggingface_split, numbered};
 use crate::formats::sink::{Field, Files, Sink};
 use crate::truth::{Cell, FrameSummary, Head, Kind, Split, part, rle};
 use crate::write;
 
-/// Nothing is missing anywhere, but `datasets` takes features from a file only where all may be.
+/// No value is null, but `datasets` uses the features of a file only if all columns are nullable.
 const fn head(name: &'static str, kind: Kind) -> Head {
     Head::new(name, kind).or_null()
 }
@@ -32,19 +33,20 @@ const fn head(name: &'static str, kind: Kind) -> Head {
 type FrameColumn = (Head, fn(&Field) -> Cell);
 type ObjectColumn = (Head, fn(&Object) -> Cell);
 
-/// What is known of a frame but its pixels: the first columns.
-const FRAME: [FrameColumn; 8] = [
+/// The columns of a frame without images.
+const FRAME: [FrameColumn; 9] = [
     (head("index", Kind::Whole), |field| Cell::Whole(field.frame.index)),
     (head("slide", Kind::Whole), |field| Cell::Whole(field.frame.slide)),
     (head("width", Kind::Whole), |field| Cell::Whole(field.frame.width as u64)),
     (head("height", Kind::Whole), |field| Cell::Whole(field.frame.height as u64)),
     (head("pixel_um", Kind::Number), |field| Cell::Number(field.frame.pixel_um)),
-    (head("bits", Kind::Whole), |field| Cell::Whole(field.frame.bits.into())),
+    (head("bits", Kind::Whole), |field| Cell::Whole(field.frame.training_bits.into())),
+    (head("camera_bits", Kind::Whole), |field| Cell::Whole(field.frame.bits.into())),
     (head("planes_um", Kind::List(&Kind::Number)), |field| Cell::numbers(&field.frame.planes_um)),
     (head("objects", Kind::List(&Kind::Struct(&OBJECT_HEADS))), objects),
 ];
 
-/// An object of a frame, and the place of its category among those of the data set.
+/// An object of a frame, and the index of its category in the data set.
 struct Object<'a> {
     frame: &'a FrameSummary,
     truth: &'a ObjectTruth,
@@ -65,14 +67,14 @@ const OBJECT: [ObjectColumn; 18] = [
         Cell::List(bounds.map(|side| Cell::Whole(side.into())).to_vec())
     }),
     (head("area", Kind::Whole), |o| Cell::Whole(o.truth.amodal.area())),
-    (head("front_area", Kind::Whole), |o| Cell::Whole(o.truth.front.area())),
+    (head("visible_area", Kind::Whole), |o| Cell::Whole(o.truth.visible.area())),
     (head("area_um2", Kind::Number), |o| Cell::Number(o.truth.area_um2)),
     (head("depth_um", Kind::Number), |o| Cell::Number(o.truth.depth_um)),
-    (head("stain", Kind::Number), |o| Cell::Number(o.truth.stain)),
+    (head("mean_absorbance", Kind::Number), |o| Cell::Number(o.truth.mean_absorbance)),
     (head("tint", Kind::Text), |o| Cell::text(o.truth.tint_name())),
     (head("truncated", Kind::Flag), |o| Cell::Flag(o.truth.truncated)),
     (head("rle", Kind::Text), |o| Cell::text(rle::encode(&o.truth.amodal, o.frame.width, o.frame.height))),
-    (head("front_rle", Kind::Text), |o| Cell::text(rle::encode(&o.truth.front, o.frame.width, o.frame.height))),
+    (head("visible_rle", Kind::Text), |o| Cell::text(rle::encode(&o.truth.visible, o.frame.width, o.frame.height))),
 ];
 
 const OBJECT_HEADS: [Head; OBJECT.len()] = {
@@ -94,14 +96,14 @@ fn objects(field: &Field) -> Cell {
     let Field { frame, document, .. } = field;
     let objects = field.truth.objects.iter().zip(&document.annotations).map(|(truth, annotation)| {
         let category = document.categories.iter().position(|category| category.id == annotation.category_id);
-        let category = category.expect("annotations are of categories of their document") as u64;
+        let category = category.expect("annotations have categories of their document") as u64;
         let object = Object { frame, truth, category };
         Cell::Struct(OBJECT.iter().map(|(_, cell)| cell(&object)).collect())
     });
     Cell::List(objects.collect())
 }
 
-fn picture(path: String, bytes: Vec<u8>) -> Cell {
+fn image(path: String, bytes: Vec<u8>) -> Cell {
     Cell::Struct(vec![Cell::Bytes(bytes), Cell::text(path)])
 }
 
@@ -109,7 +111,7 @@ fn picture(path: String, bytes: Vec<u8>) -> Cell {
 #[derive(Default)]
 struct Shard {
     files: BTreeMap<Split, (Pending, Writer<'static>)>,
-    /// The planes of a stack as PNG; a single plane is the picture.
+    /// The planes of a stack as PNG; empty for a single plane.
     planes: Vec<Vec<u8>>,
 }
 
@@ -126,7 +128,13 @@ impl Sink for Shard {
 
     fn plane(&mut self, plane: &Plane, frame: &FrameSummary, files: &Files) -> Result<(), Error> {
         if frame.is_stack() {
-            let png = write::png(&plane.grey, frame.width, frame.channels, frame.bits, frame.pixel_um);
+            let png = write::png(
+                &to_training(&plane.grey, frame.bits),
+                frame.width,
+                frame.channels,
+                frame.training_bits,
+                frame.pixel_um,
+            );
             let path = files.folder.path(&huggingface_file(Split::of_slide(files.seed, frame.slide), files.shard));
             self.planes.push(png.map_err(Error::io("encode", &path))?);
         }
@@ -138,9 +146,12 @@ impl Sink for Shard {
         let name = huggingface_file(split, files.shard);
         let path = files.folder.path(&name);
         let mut row: Vec<Cell> = FRAME.iter().map(|(_, cell)| cell(field)).collect();
-        row.push(picture(format!("{key}{PICTURE}"), field.png().map_err(Error::io("encode", &path))?.to_vec()));
+        row.push(image(
+            format!("{key}{FILE}"),
+            field.png(Depth::Training).map_err(Error::io("encode", &path))?.to_vec(),
+        ));
         let planes = std::mem::take(&mut self.planes).into_iter().enumerate();
-        let planes = planes.map(|(number, png)| picture(format!("{key}.{number:03}{PICTURE}"), png));
+        let planes = planes.map(|(number, png)| image(format!("{key}.{number:03}{FILE}"), png));
         row.push(Cell::List(planes.collect()));
         let (_, writer) = match self.files.entry(split) {
             Entry::Occupied(entry) => entry.into_mut(),
@@ -165,7 +176,7 @@ impl Sink for Shard {
     }
 }
 
-/// The card, whose head names the files of the splits that there are and the features.
+/// Returns the dataset card. Its header has the files of each split with frames, and the features.
 #[expect(clippy::unnecessary_wraps, reason = "without the feature it fails")]
 pub(crate) fn card(classes: &[String], splits: &[Split]) -> Result<(String, Vec<u8>), Error> {
     let mut text = "---\nlicense: cc0-1.0\ntask_categories:\n- image-segmentation\n- object-detection\ntags:\n- synthetic\n- cytology\n\
@@ -177,17 +188,18 @@ pub(crate) fn card(classes: &[String], splits: &[Split]) -> Result<(String, Vec<
     }
     let _ = writeln!(text, "dataset_info:\n  features: {}\n---", yaml(&columns(), classes));
     text.push_str(
-        "\n# Synthetic cervical smears\n\nA row is a field: `image` (of a focus stack, everything in focus, and its planes in `planes`), and in `objects` \
-         every cell, nucleus and piece of debris with its complete mask (`rle`) and the part of it that nothing hides (`front_rle`), as COCO's \
-         compressed run lengths. Splits are by slide: fields of a slide share stain and light.\n\n```python\nfrom datasets import \
+        "\n# Synthetic cervical smears\n\nA row is a field. `image` is the image (for a focus stack, all in focus), `planes` has the planes of a \
+         stack; images have 8 bits. `objects` has every cell, nucleus and piece of debris, with its complete mask (`rle`) and its \
+         visible mask (`visible_rle`) as COCO's compressed run lengths. Splits are by slide, because fields of a slide have the same \
+         staining and light.\n\n```python\nfrom datasets import \
          load_dataset\n\nfields = load_dataset(\"huggingface\", split=\"train\")    # this folder\n```\n",
     );
     Ok((HUGGINGFACE_CARD.to_owned(), text.into_bytes()))
 }
 
-/// The files of an image, its picture or all its planes, from a file whose SHA-256 is that of its record.
+/// Reads the files of an image, or of all planes of a stack. The SHA-256 of the Parquet file must be checked before.
 pub(crate) fn images(path: &Path, image: &str) -> Result<Vec<Vec<u8>>, Error> {
-    let named = image.strip_suffix(PICTURE).map(|index| (index, "image"));
+    let named = image.strip_suffix(FILE).map(|index| (index, "image"));
     let named = named.or(image.strip_suffix(PLANES).map(|index| (index, "planes")));
     let wanted = named.and_then(|(index, column)| Some((index.parse().ok()?, column)));
     let found = match wanted {
@@ -195,11 +207,11 @@ pub(crate) fn images(path: &Path, image: &str) -> Result<Vec<Vec<u8>>, Error> {
         None => None,
     };
     found.ok_or_else(|| {
-        Error::input(path)(Problem::broken("Parquet", format!("it has no image `{}`", image.escape_default())))
+        Error::input(path)(Problem::broken("Parquet", format!("the file has no image `{}`", image.escape_default())))
     })
 }
 
-/// The images in a column of the row of a frame, if there is that row. Each group of rows is read by itself.
+/// Returns the images in a column of the row of a frame, if there is one. Row groups are read one at a time.
 fn find(path: &Path, index: i64, column: &str) -> Result<Option<Vec<Vec<u8>>>, ParquetError> {
     let reader = SerializedFileReader::new(File::open(path)?)?;
     let fields = reader.metadata().file_metadata().schema().get_fields().to_vec();
@@ -233,7 +245,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn features_are_json_that_names_every_column_in_its_order() {
+    fn features_are_json_with_all_columns_in_order() {
         let classes = ["superficial \"nucleus\"".to_owned(), "debris".to_owned()];
         let text = metadata(&columns(), &classes);
         let json: serde_json::Value = serde_json::from_str(&text).unwrap();

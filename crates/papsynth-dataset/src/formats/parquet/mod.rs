@@ -1,4 +1,4 @@
-//! What is written as Parquet: tables of objects, and the format `huggingface`.
+//! Parquet: tables of objects, and the format `huggingface`.
 
 mod features;
 mod frames;
@@ -19,7 +19,7 @@ pub(crate) struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
-    /// Begins a table with these columns; `path` is named in errors.
+    /// Begins a table with these columns. Errors give `path`.
     pub(crate) fn begin(out: impl Write + Send + 'a, path: &Path, columns: Vec<Named>) -> Result<Self, Error> {
         let heads = columns.iter().map(|(head, _)| *head).collect();
         let writer = Writer::new(Box::new(out), heads, &[]).map_err(failed("write", path))?;

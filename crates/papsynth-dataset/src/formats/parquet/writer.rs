@@ -1,4 +1,4 @@
-//! Rows in, a Parquet file out: the same bytes for the same rows, and memory for one group of them.
+//! A Parquet writer for rows: equal rows give equal bytes, and memory is needed for one row group.
 
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
@@ -15,17 +15,17 @@ use parquet::schema::types::{SchemaDescriptor, Type, TypePtr};
 use crate::error::{Error, Problem};
 use crate::truth::{Cell, Head, Kind};
 
-/// A group of rows is written when it has so many bytes in memory, about, or so many rows.
+/// Size of a row group: approximate bytes in memory, and rows.
 const GROUP_BYTES: usize = 32 << 20;
 const GROUP_ROWS: usize = 1 << 16;
 
-/// Bytes that are put together before they go to the file.
+/// Size of the write buffer, bytes.
 const BUFFER_BYTES: usize = 1 << 18;
 
-/// What the file says that it was written by: the same whatever stands behind it.
+/// The writer in the metadata of the file. It does not depend on the version of the Parquet library.
 const CREATED_BY: &str = concat!("papsynth-parquet version ", env!("CARGO_PKG_VERSION"));
 
-/// The kinds of the columns of the file that hold the values of one of these.
+/// Returns the types of the leaf columns of a type.
 fn leaves(kind: Kind) -> Vec<Kind> {
     match kind {
         Kind::List(kind) => leaves(*kind),
@@ -67,7 +67,7 @@ fn node(name: &str, kind: Kind, repetition: Repetition) -> Result<TypePtr, Parqu
     }))
 }
 
-/// The values of a column of the file that are there.
+/// The values of a leaf column that are not null.
 enum Values {
     Bool(Vec<bool>),
     U32(Vec<i32>),
@@ -76,23 +76,23 @@ enum Values {
     Bytes(Vec<ByteArray>),
 }
 
-/// A column of the file, with the levels that say to which row and list each value belongs.
+/// A leaf column, with the levels that assign each value to its row and list.
 struct Leaf {
     values: Values,
-    /// How many of the optional and repeated things on the way to it are there, for each value and each lack of one.
+    /// For each value or null: number of optional and repeated ancestors that are defined.
     definitions: Vec<i16>,
-    /// At which list it goes on; 0 begins a row.
+    /// For each value or null: the list that continues; 0 starts a row.
     repetitions: Vec<i16>,
 }
 
-/// Where a value lies among optional and repeated things.
+/// Levels of a value.
 #[derive(Clone, Copy, Default)]
 struct Level {
-    /// How many of those above it are there.
+    /// Number of optional and repeated ancestors that are defined.
     definition: i16,
-    /// How many lists there are above it.
+    /// Number of lists among the ancestors.
     depth: i16,
-    /// At which of them it goes on.
+    /// The list that continues.
     repetition: i16,
 }
 
@@ -108,7 +108,7 @@ impl Leaf {
         Self { values, definitions: Vec::new(), repetitions: Vec::new() }
     }
 
-    /// Adds a value, or the lack of one, and says how many bytes it takes, about.
+    /// Adds a value or null. Returns the approximate number of bytes.
     fn push(&mut self, value: Cell, level: Level) -> usize {
         let length = match &value {
             Cell::Text(text) => text.len(),
@@ -118,9 +118,9 @@ impl Leaf {
         match (value, &mut self.values) {
             (Cell::Nothing, _) => {}
             (Cell::Flag(value), Values::Bool(values)) => values.push(value),
-            // The same bits: the column says that they have no sign.
+            // Parquet stores unsigned integers as signed ones with the same bits.
             (Cell::Id(value), Values::U32(values)) => values.push(value.cast_signed()),
-            // Tables have no unsigned numbers of 64 bits that everybody reads; none of ours is so large.
+            // Signed, because some readers do not support unsigned 64-bit integers. Values are small enough.
             (Cell::Whole(value), Values::I64(values)) => values.push(i64::try_from(value).unwrap_or(i64::MAX)),
             (Cell::Number(value), Values::F64(values)) => values.push(value),
             (Cell::Text(value), Values::Bytes(values)) => values.push(value.into_bytes().into()),
@@ -151,7 +151,8 @@ impl Leaf {
     }
 }
 
-/// Takes a value apart into its leaves, as Dremel does: Melnik et al., VLDB 3 (2010) 330-339. Says how many bytes it takes in memory, about.
+/// Shreds a value into its leaf columns, as Dremel does: Melnik et al., VLDB 3 (2010) 330-339. Returns the approximate number of
+/// bytes in memory.
 fn shred(kind: Kind, nullable: bool, value: Cell, at: Level, leaves: &mut [Leaf]) -> usize {
     let lack = |level, leaves: &mut [Leaf]| leaves.iter_mut().map(|leaf| leaf.push(Cell::Nothing, level)).sum();
     let there = Level { definition: at.definition + i16::from(nullable), ..at };
@@ -179,7 +180,7 @@ fn shred_all(columns: &[Head], values: Vec<Cell>, at: Level, mut leaves: &mut [L
     bytes
 }
 
-/// Writes a table row by row. Dropped before it is finished, it leaves no Parquet file.
+/// Writes a table row by row. The file is valid only after [`finish`](Self::finish).
 pub(super) struct Writer<'a> {
     file: SerializedFileWriter<BufWriter<Box<dyn Write + Send + 'a>>>,
     columns: Vec<Head>,
@@ -189,7 +190,7 @@ pub(super) struct Writer<'a> {
 }
 
 impl<'a> Writer<'a> {
-    /// Begins a table with these columns and pairs of a name and a text that the footer keeps.
+    /// Begins a table with these columns and key-value metadata.
     pub(super) fn new(
         out: Box<dyn Write + Send + 'a>,
         columns: Vec<Head>,
@@ -283,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn nested_rows_are_read_back_as_they_were_written() {
+    fn nested_rows_are_read_back() {
         const FIELDS: &[Head] = &[
             Head::new("id", Kind::Id).or_null(),
             Head::new("name", Kind::Text),
@@ -318,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn memory_is_bounded_by_a_group() {
+    fn memory_is_bounded_by_a_row_group() {
         let scratch = Scratch::new("bounded-rows");
         let mut writer = begin(&scratch, vec![Head::new("data", Kind::Bytes)]);
         for n in 1..=70_u64 {
@@ -326,7 +327,7 @@ mod tests {
             let written = scratch.join("table.parquet").metadata().unwrap().len();
             assert!(
                 (n << 20) <= written + (GROUP_BYTES + BUFFER_BYTES) as u64,
-                "{written} bytes are written after {n} rows"
+                "{written} bytes written after {n} rows"
             );
         }
         writer.finish().unwrap();

@@ -1,14 +1,14 @@
-//! Files that are changed, cut, lost or too many.
+//! Files that are changed, truncated, missing or untracked.
 
 use std::fs;
 
 use papsynth::model::Model;
-use papsynth_dataset::{Dataset, DatasetInfo, Format, Layout, Mend, clean, verify};
+use papsynth_dataset::{Dataset, DatasetInfo, Fix, Format, Layout, clean, verify};
 
 use super::{fill, is_found, look, make};
 use crate::support::{SEED, Scratch, contents, frame, recipe};
 
-/// The usual little generator: which bits turn over must only be the same every time.
+/// A linear congruential generator: the flipped bits are the same in every run.
 struct Numbers(u64);
 
 impl Numbers {
@@ -19,21 +19,21 @@ impl Numbers {
 }
 
 #[test]
-fn a_whole_data_set_has_a_root() {
+fn a_complete_data_set_has_a_root() {
     let (one, two) = (make("root-1"), make("root-2"));
-    let verdict = look(one.path());
-    assert_eq!((verdict.frames, verdict.findings.len()), (3, 0));
-    assert!(verdict.root.is_some());
-    assert_eq!(verdict, look(two.path()));
-    assert_eq!(verdict.files, contents(one.path()).len() as u64);
+    let report = look(one.path());
+    assert_eq!((report.frames, report.findings.len()), (3, 0));
+    assert!(report.root.is_some());
+    assert_eq!(report, look(two.path()));
+    assert_eq!(report.files, contents(one.path()).len() as u64);
 }
 
 #[test]
-fn every_bit_that_turns_over_is_found() {
+fn every_flipped_bit_is_found() {
     let scratch = make("flips");
     let files = contents(scratch.path());
     let mut numbers = Numbers(1);
-    // Every file in turn, so that small ones are not spared; a thousand with `PAPSYNTH_TORTURE`.
+    // Cycles through all files; 1000 flips with `PAPSYNTH_TORTURE`.
     let count = if std::env::var_os("PAPSYNTH_TORTURE").is_some() { 1000 } else { 3 * files.len() };
     for number in 0..count {
         let (name, bytes) = &files[number % files.len()];
@@ -48,7 +48,7 @@ fn every_bit_that_turns_over_is_found() {
 }
 
 #[test]
-fn every_file_that_is_cut_is_found() {
+fn every_truncated_file_is_found() {
     let scratch = make("cuts");
     let files = contents(scratch.path());
     let mut numbers = Numbers(2);
@@ -62,7 +62,7 @@ fn every_file_that_is_cut_is_found() {
 }
 
 #[test]
-fn every_file_that_is_gone_or_too_many_is_found() {
+fn every_missing_or_untracked_file_is_found() {
     let scratch = make("gone");
     for (name, bytes) in contents(scratch.path()) {
         let path = scratch.join(&name);
@@ -72,35 +72,34 @@ fn every_file_that_is_gone_or_too_many_is_found() {
             fill(scratch.path(), 2);
             assert_eq!(fs::read(&path).unwrap(), bytes);
         } else {
-            let verdict = look(scratch.path());
-            // Without its record a shard is not there: its frames are missing, its files too many.
-            assert!(is_found(&verdict, &name), "{name}: {verdict:?}");
+            let report = look(scratch.path());
+            assert!(is_found(&report, &name), "{name}: {report:?}");
         }
         fs::write(&path, bytes).unwrap();
     }
     fs::write(scratch.join("images/notes.txt"), "mine").unwrap();
     fs::write(scratch.join("labels/.000009.tif.0123.tmp"), "half").unwrap();
     let found = look(scratch.path()).findings;
-    let strays: Vec<(&str, Mend)> = found.iter().map(|finding| (finding.path.as_str(), finding.mend)).collect();
-    assert_eq!(strays, [("images/notes.txt", Mend::Clean), ("labels/.000009.tif.0123.tmp", Mend::Clean)]);
+    let untracked: Vec<(&str, Fix)> = found.iter().map(|finding| (finding.path.as_str(), finding.fix)).collect();
+    assert_eq!(untracked, [("images/notes.txt", Fix::Clean), ("labels/.000009.tif.0123.tmp", Fix::Clean)]);
     let cleaned = clean(scratch.path(), false).unwrap();
-    assert_eq!((cleaned.temporary, cleaned.strays), (1, 0));
+    assert_eq!((cleaned.temporary, cleaned.untracked), (1, 0));
     assert!(scratch.join("images/notes.txt").exists());
-    assert_eq!(clean(scratch.path(), true).unwrap().strays, 1);
+    assert_eq!(clean(scratch.path(), true).unwrap().untracked, 1);
     assert!(look(scratch.path()).root.is_some());
     assert!(verify(scratch.path(), Some(0..9)).unwrap().findings[0].message.contains("frame"));
 }
 
 #[test]
-fn a_folder_where_a_file_belongs_is_found_and_gives_way() {
+fn a_folder_with_the_name_of_a_file_is_found_and_replaced() {
     let scratch = make("folder-for-file");
     let before = contents(scratch.path());
     let name = "images/000001.png";
     let place = scratch.join(name);
-    let mend = |strays: Option<u64>| {
+    let repair = |untracked: Option<u64>| {
         assert!(is_found(&look(scratch.path()), name));
-        if let Some(strays) = strays {
-            assert_eq!(clean(scratch.path(), true).unwrap().strays, strays);
+        if let Some(untracked) = untracked {
+            assert_eq!(clean(scratch.path(), true).unwrap().untracked, untracked);
             assert!(!place.exists() && scratch.join("images").exists());
         }
         fill(scratch.path(), 2);
@@ -109,19 +108,21 @@ fn a_folder_where_a_file_belongs_is_found_and_gives_way() {
     };
     fs::remove_file(&place).unwrap();
     fs::create_dir(&place).unwrap();
-    mend(None);
+    repair(None);
     fs::create_dir_all(place.join("deep")).unwrap();
-    mend(Some(0));
+    repair(Some(0));
     fs::create_dir_all(place.join("deep")).unwrap();
     fs::write(place.join("deep/notes.txt"), "mine").unwrap();
-    mend(Some(1));
+    repair(Some(1));
 }
 
 #[test]
-fn before_it_is_merged_nothing_is_taken_for_a_stray() {
+fn untracked_files_are_not_removed_before_the_merge() {
     let scratch = Scratch::new("unmerged");
-    let recipe =
-        papsynth::recipe::Recipe { layout: papsynth::recipe::Layout::Map { path: "map.png".to_owned() }, ..recipe() };
+    let recipe = papsynth::recipe::Recipe {
+        layout: papsynth::recipe::Layout::DensityMap { path: "map.png".to_owned() },
+        ..recipe()
+    };
     let layout = Layout { frames_per_shard: 1, ..Layout::new([Format::Folder]) };
     let map = papsynth_dataset::read::InputFile { name: "map.png".to_owned(), bytes: b"a map".to_vec() };
     let info = DatasetInfo { recipe: &recipe, model: &Model::builtin(), seed: SEED, map: Some(&map), layout: &layout };
@@ -132,11 +133,11 @@ fn before_it_is_merged_nothing_is_taken_for_a_stray() {
     writer.write_plane(&one.planes[0]).unwrap();
     writer.end(&one.finished).unwrap();
     writer.commit().unwrap();
-    // Somebody is writing the second frame.
+    // Another process writes the second frame.
     fs::write(scratch.join("images/000001.png"), "half of it").unwrap();
     let before = contents(scratch.path());
     let found = verify(scratch.path(), None).unwrap().findings;
-    // That it is not merged is one finding.
+    // The missing merge is one finding.
     let paths: Vec<&str> = found.iter().map(|finding| finding.path.as_str()).collect();
     assert_eq!(paths, ["images/000001.png", "manifest.json"]);
     let refused = clean(scratch.path(), true).unwrap_err();
@@ -149,7 +150,7 @@ fn before_it_is_merged_nothing_is_taken_for_a_stray() {
 }
 
 #[test]
-fn what_is_damaged_is_not_converted() {
+fn damaged_data_sets_are_not_converted() {
     let scratch = make("convert-damaged");
     let to = Scratch::new("convert-to");
     let layout = Layout::new([Format::Cellpose]);
@@ -165,12 +166,12 @@ fn what_is_damaged_is_not_converted() {
         assert!(!error.is_io() && error.to_string().contains(if lost { "shards" } else { name }), "{error}");
         fs::write(path, good).unwrap();
     }
-    assert_eq!(convert().unwrap().made, 3);
+    assert_eq!(convert().unwrap().written, 3);
 }
 
 #[test]
 #[cfg(unix)]
-fn links_are_strays_and_lead_nowhere() {
+fn symbolic_links_are_untracked_and_not_followed() {
     let (scratch, elsewhere) = (make("links"), Scratch::new("elsewhere"));
     fs::write(elsewhere.join("precious.txt"), "mine").unwrap();
     std::os::unix::fs::symlink(elsewhere.path(), scratch.join("link")).unwrap();
@@ -181,7 +182,7 @@ fn links_are_strays_and_lead_nowhere() {
 }
 
 #[test]
-fn a_record_that_says_the_same_in_other_bytes_is_found_and_written_again() {
+fn a_reformatted_record_is_found_and_rewritten() {
     let scratch = make("reworded");
     let before = contents(scratch.path());
     let name = "shards/000000.json";
@@ -196,33 +197,33 @@ fn a_record_that_says_the_same_in_other_bytes_is_found_and_written_again() {
 }
 
 #[test]
-fn a_lost_record_is_named_and_what_it_vouched_for_is_no_stray() {
+fn a_missing_record_is_found_and_its_files_are_not_untracked() {
     let scratch = make("lost-last");
     for lost in [&[1_u64][..], &[0, 1]] {
         for shard in lost {
             fs::remove_file(scratch.join(&format!("shards/{shard:06}.json"))).unwrap();
         }
-        let verdict = verify(scratch.path(), None).unwrap();
-        let [finding] = &verdict.findings[..] else { panic!("{verdict:?}") };
+        let report = verify(scratch.path(), None).unwrap();
+        let [finding] = &report.findings[..] else { panic!("{report:?}") };
         let first = format!("shards/{:06}.json", lost[0]);
-        assert_eq!((finding.path.as_str(), finding.mend), (first.as_str(), Mend::Generate), "{verdict:?}");
+        assert_eq!((finding.path.as_str(), finding.fix), (first.as_str(), Fix::Generate), "{report:?}");
         fill(scratch.path(), 2);
         assert!(look(scratch.path()).root.is_some());
     }
 }
 
 #[test]
-fn what_is_not_merged_is_not_called_damaged() {
+fn an_unmerged_data_set_is_not_reported_as_damaged() {
     let scratch = Scratch::new("unmerged");
     let (recipe, layout) = (recipe(), Layout::new([Format::Folder]));
     let info = DatasetInfo { recipe: &recipe, model: &Model::builtin(), seed: SEED, map: None, layout: &layout };
     let dataset = Dataset::create_or_resume(scratch.path(), &info).unwrap();
     let told = |message: &str| {
-        let verdict = verify(scratch.path(), None).unwrap();
-        let [finding] = &verdict.findings[..] else { panic!("{verdict:?}") };
+        let report = verify(scratch.path(), None).unwrap();
+        let [finding] = &report.findings[..] else { panic!("{report:?}") };
         assert_eq!(
-            (finding.path.as_str(), finding.mend, finding.message.as_str()),
-            ("manifest.json", Mend::Merge, message)
+            (finding.path.as_str(), finding.fix, finding.message.as_str()),
+            ("manifest.json", Fix::Merge, message)
         );
     };
     let write = |index| {
@@ -233,17 +234,17 @@ fn what_is_not_merged_is_not_called_damaged() {
         writer.end(&one.finished).unwrap();
         writer.commit().unwrap();
     };
-    told("no frame is made yet");
+    told("no frame is written yet");
     write(0);
-    told("0 of 1 shards are merged");
+    told("merged shards: 0 of 1");
     dataset.finish().unwrap();
     assert!(verify(scratch.path(), None).unwrap().root.is_some());
     write(1);
-    told("1 of 2 shards are merged");
+    told("merged shards: 1 of 2");
 }
 
 #[test]
-fn a_set_within_a_set_is_refused_and_not_cleaned_away() {
+fn a_data_set_inside_a_data_set_is_refused_and_not_removed() {
     let scratch = make("outer");
     let begin = |path: &std::path::Path| {
         let (recipe, layout) = (recipe(), Layout::new([Format::Folder]));
@@ -252,22 +253,22 @@ fn a_set_within_a_set_is_refused_and_not_cleaned_away() {
     };
     for inner in ["inner", "images/inner", "one/two/../inner"] {
         let refused = begin(&scratch.join(inner)).unwrap_err().to_string();
-        assert!(refused.contains("lies within"), "{refused}");
+        assert!(refused.contains("is inside the data set"), "{refused}");
         assert!(look(scratch.path()).root.is_some());
     }
-    // One that came there in another way stays.
+    // A data set that was moved there is not removed.
     let beside = Scratch::new("beside");
     begin(beside.path()).unwrap();
     fs::rename(beside.path(), scratch.join("inner")).unwrap();
     let before = contents(scratch.path());
     let refused = clean(scratch.path(), true).unwrap_err().to_string();
-    assert!(refused.contains("inner lies within"), "{refused}");
+    assert!(refused.contains("contains another data set or slide in ") && refused.contains("inner"), "{refused}");
     assert_eq!(contents(scratch.path()), before);
 }
 
 #[test]
 #[cfg(unix)]
-fn what_cannot_be_mended_for_a_link_keeps_its_record() {
+fn a_shard_that_cannot_be_rewritten_because_of_a_link_keeps_its_record() {
     let (scratch, elsewhere) = (make("link-mend"), Scratch::new("link-mend-elsewhere"));
     let before: Vec<_> = fs::read_dir(scratch.join("shards")).unwrap().map(|entry| entry.unwrap().path()).collect();
     fs::create_dir_all(elsewhere.path()).unwrap();
@@ -279,4 +280,61 @@ fn what_cannot_be_mended_for_a_link_keeps_its_record() {
     let refused = dataset.shard_writer(0).err().unwrap().to_string();
     assert!(refused.contains("images") && before.iter().all(|file| file.exists()), "{refused}");
     assert!(contents(elsewhere.path()).is_empty());
+}
+
+#[test]
+fn files_of_the_desktop_are_ignored() {
+    let scratch = make("desktop");
+    for name in [".DS_Store", "shards/.DS_Store", "images/Thumbs.db", "images/desktop.ini", "images/._000001.png"] {
+        fs::write(scratch.join(name), "view settings").unwrap();
+    }
+    assert!(look(scratch.path()).root.is_some(), "{:?}", look(scratch.path()));
+    assert_eq!(clean(scratch.path(), true).unwrap().untracked, 0);
+    // A folder with nothing else counts as empty.
+    let other = Scratch::new("desktop-empty");
+    fs::write(other.join(".DS_Store"), "view settings").unwrap();
+    fill(other.path(), 2);
+    assert!(look(other.path()).root.is_some());
+}
+
+#[test]
+fn a_damaged_record_is_one_finding_and_its_files_are_not_untracked() {
+    for is_merged in [true, false] {
+        let scratch = make("bad-record");
+        if !is_merged {
+            // As before the merge, whose manifest lists no file of a shard.
+            let manifest = fs::read_to_string(scratch.join("manifest.json")).unwrap();
+            let lines = manifest.lines().filter(|line| !line.contains("\"shard\":")).collect::<Vec<_>>().join("\n");
+            fs::write(scratch.join("manifest.json"), format!("{}]}}\n", lines.trim_end_matches(','))).unwrap();
+        }
+        fs::write(scratch.join("shards/000000.json"), "{").unwrap();
+        fs::write(scratch.join("notes.txt"), "mine").unwrap();
+        let report = look(scratch.path());
+        let found: Vec<(&str, Fix)> = report.findings.iter().map(|f| (f.path.as_str(), f.fix)).collect();
+        assert_eq!(found, [("notes.txt", Fix::Clean), ("shards/000000.json", Fix::Generate)], "{report:?}");
+    }
+}
+
+#[test]
+fn inputs_that_were_changed_after_generation_are_refused() {
+    let scratch = make("changed-inputs");
+    let dataset = Dataset::open(scratch.path()).unwrap();
+    dataset.check_inputs().unwrap();
+    for name in ["recipe.toml", "model.json"] {
+        let good = fs::read(scratch.join(name)).unwrap();
+        fs::write(scratch.join(name), [&good[..], b"\n"].concat()).unwrap();
+        let refused = dataset.check_inputs().unwrap_err();
+        let (is_io, refused) = (refused.is_io(), refused.to_string());
+        assert!(!is_io && refused.contains(name) && refused.contains("changed after generation"), "{refused}");
+        fs::write(scratch.join(name), good).unwrap();
+    }
+}
+
+#[test]
+fn progress_counts_all_shards() {
+    let scratch = make("progress");
+    let seen = std::cell::RefCell::new(Vec::new());
+    let report = |progress: papsynth_dataset::VerifyProgress| seen.borrow_mut().push((progress.done, progress.total));
+    papsynth_dataset::verify_with_progress(scratch.path(), None, &report).unwrap();
+    assert_eq!(*seen.borrow(), [(1, 2), (2, 2)]);
 }

@@ -1,31 +1,31 @@
-//! Whatever happens to a file is found.
+//! Verification finds every change of a file.
 
 #![allow(clippy::cast_possible_truncation, reason = "the numbers are small")]
 
 mod damage;
-mod lies;
+mod forged;
 
 use std::path::Path;
 
 use crate::support::{SEED, Scratch, frame, recipe};
 use papsynth::model::Model;
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Layout, Verdict, verify};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Layout, VerifyReport, verify};
 
-/// A data set in all formats, of a stack and two images.
+/// Generates a data set of a stack and two images in all formats.
 fn make(name: &str) -> Scratch {
     let scratch = Scratch::new(name);
     fill(scratch.path(), 2);
     scratch
 }
 
-/// Begins it, or goes on with it, and merges.
+/// Creates or resumes the data set, and merges it.
 fn fill(path: &Path, frames_per_shard: usize) {
     let layout = Layout { frames_per_shard: frames_per_shard as u64, ..Layout::new(Format::built()) };
     let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout: &layout };
     let dataset = Dataset::create_or_resume(path, &info).unwrap();
     let frames = [frame(0, 2, 8, 1), frame(1, 1, 8, 1), frame(2, 1, 12, 1)];
     for (shard, frames) in (0..).zip(frames.chunks(frames_per_shard)) {
-        if dataset.whole(shard, Check::Hashes).unwrap().is_some() {
+        if dataset.complete_record(shard, Check::Hashes).unwrap().is_some() {
             continue;
         }
         let mut writer = dataset.shard_writer(shard).unwrap();
@@ -39,11 +39,11 @@ fn fill(path: &Path, frames_per_shard: usize) {
     dataset.finish().unwrap();
 }
 
-fn look(path: &Path) -> Verdict {
+fn look(path: &Path) -> VerifyReport {
     verify(path, Some(0..3)).unwrap()
 }
 
 /// Whether the finding is about this file, or about the record or manifest that names it.
-fn is_found(verdict: &Verdict, name: &str) -> bool {
-    verdict.root.is_none() && verdict.findings.iter().any(|finding| finding.path == name)
+fn is_found(report: &VerifyReport, name: &str) -> bool {
+    report.root.is_none() && report.findings.iter().any(|finding| finding.path == name)
 }

@@ -1,6 +1,6 @@
 "use strict";
 
-// The page knows which trial is next and what its patches are asked for by. What they show, only the server knows.
+// The page receives the number of the next trial and the names of its patches, never the answer.
 
 const FIXATION_MS = 700;
 const REST_EVERY = 30;
@@ -11,13 +11,13 @@ const ANSWERS = { "yes-no": ["real", "synthetic"], "2afc": ["left", "right"] };
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
-/** What is asked next, as the server says. */
+/** State of the study, from the server. */
 let state = null;
 
-/** When the question appeared. */
+/** Time at which the question appeared. */
 let asked = 0;
 
-/** The report that the patches of this trial were seen, under way or done. */
+/** The pending report that the patches of this trial were shown. */
 let reported = Promise.resolve();
 
 function show(screen) {
@@ -29,10 +29,10 @@ function show(screen) {
 
 const screen = () => document.body.dataset.screen;
 
-/** Thrown where the server speaks of another trial than this page: another page went on, or an answer had arrived. */
+/** Thrown if the server is at another trial than this page. */
 class Stale extends Error {}
 
-/** Asks the server until it answers. Nothing that was answered is lost if it is gone for a while. */
+/** Sends a request and repeats it until the server responds. */
 async function ask(path, body) {
   for (let before = null; ; ) {
     let problem;
@@ -45,7 +45,7 @@ async function ask(path, body) {
         if (before !== null) show(before);
         throw new Stale();
       }
-      problem = error.status ? `The study program says: ${error.message}.` : "The study program does not answer.";
+      problem = error.status ? `The study program reports: ${error.message}.` : "The study program does not respond.";
     }
     if (before === null) before = screen();
     element("lost-text").textContent = problem;
@@ -66,19 +66,19 @@ function progress() {
   element("progress").textContent = finished || isFresh() ? "" : text;
 }
 
-/** Whether nothing has been seen yet. */
+/** Whether no trial was shown yet. */
 const isFresh = () => state.answered === 0 && !state.shown;
 
-/** Goes on with what the server says is next. */
+/** Continues with the next trial. */
 function next() {
   if (state.finished) return result();
   if (state.shown) return question();
   const { stage, number, training, trials } = state;
   if (stage === "counted" && number === 1 && training > 0) {
-    return rest("Now it counts", `${trials} ${things(trials)} follow.`);
+    return rest("End of practice", `${trials} ${things(trials)} follow.`);
   }
   if (stage === "counted" && number > 1 && (number - 1) % REST_EVERY === 0) {
-    return rest("A moment's rest", `${number - 1} of ${trials} are done. Look out of the window; go on when you like.`);
+    return rest("Rest", `${number - 1} of ${trials} trials are done. Rest your eyes, and continue when you are ready.`);
   }
   return trial();
 }
@@ -103,7 +103,7 @@ function welcome() {
   show("welcome");
 }
 
-/** The patches of this trial, ready to be drawn: nothing is decoded while they are shown. */
+/** Returns the decoded patches of this trial. */
 async function fetched() {
   const bitmaps = [];
   for (const name of state.patches) {
@@ -113,7 +113,7 @@ async function fetched() {
   return bitmaps;
 }
 
-/** Canvases in the size of the patches: each pixel of a patch is one of the page, or the nearest whole number of the screen's. */
+/** Creates canvases that show each pixel of a patch as a whole number of screen pixels. */
 function canvases() {
   const side = state.patch_px;
   const length = side * Math.max(1, Math.round(devicePixelRatio)) / devicePixelRatio;
@@ -127,7 +127,7 @@ function canvases() {
   return all;
 }
 
-/** Calls `step` with the time of each frame until it returns something. Nothing comes of it if the page is not seen. */
+/** Calls `step` with the time of each frame until it returns a value. Ends at once if the page is hidden. */
 function frames(step) {
   return new Promise((resolve) => {
     let done = false;
@@ -136,7 +136,7 @@ function frames(step) {
       document.removeEventListener("visibilitychange", hidden);
       resolve(outcome);
     };
-    // Frames do not come while the page is covered: what was under way then is over at once.
+    // Browsers stop animation frames of a hidden page.
     const hidden = () => { if (document.hidden) end({ hidden: true }); };
     const tick = (now) => {
       if (done) return;
@@ -150,7 +150,7 @@ function frames(step) {
   });
 }
 
-/** The cross. Says how long a frame of this screen takes. */
+/** Shows the cross. Returns the duration of a frame of this screen. */
 function fixate() {
   let began, last, shortest = Infinity;
   show("fixation");
@@ -163,8 +163,8 @@ function fixate() {
 }
 
 /**
- * Shows the patches and takes them away with the frame that is nearest to the end of their time. The exposure is the time between
- * the two frames: both reach the screen equally late.
+ * Shows the patches and removes them with the frame nearest to the end of the exposure. The exposure is the time between the two
+ * frames, which reach the screen with the same delay.
  */
 function expose(bitmaps, all, frame_ms) {
   let began, last, count = 0, longest = 0;
@@ -194,12 +194,12 @@ async function trial() {
     bitmaps.forEach((bitmap) => bitmap.close());
     element("patches").replaceChildren();
     if (exposure.hidden) {
-      rest("Not seen to its end", `The page was covered. The ${things(1)} is shown again.`);
+      rest("Interrupted", `The page was hidden. The ${things(1)} is shown again.`);
       return;
     }
     question();
     reported = ask("shown", { patch: state.patches[0], exposure }).then((response) => response.json());
-    // Whatever is wrong with it is found when the answer waits for it.
+    // Errors are handled when the answer is sent.
     reported.catch(() => {});
   } catch (error) {
     await recover(error);
@@ -213,15 +213,15 @@ function question() {
   asked = performance.now();
 }
 
-/** Takes the answer of a position, 0 or 1. */
+/** Sends the answer at position 0 or 1. */
 async function answer(position, now) {
   if (screen() !== "question") return;
   const response_ms = Math.max(0, now - asked);
-  const said = { patch: state.patches[0], answer: ANSWERS[state.task][position], response_ms };
+  const body = { patch: state.patches[0], answer: ANSWERS[state.task][position], response_ms };
   show("fixation");
   try {
     await reported;
-    state = await (await ask("answer", said)).json();
+    state = await (await ask("answer", body)).json();
     progress();
     next();
   } catch (error) {
@@ -229,7 +229,7 @@ async function answer(position, now) {
   }
 }
 
-/** Goes on with what the server knows. */
+/** Reloads the state from the server. */
 async function recover(error) {
   if (!(error instanceof Stale)) {
     element("trouble").textContent = String(error);
@@ -238,7 +238,7 @@ async function recover(error) {
   reported = Promise.resolve();
   await load();
   if (state.finished || state.shown) next();
-  else rest("Go on", "The study was interrupted. Every answer is kept.");
+  else rest("Continue", "The study was interrupted. All answers are saved.");
 }
 
 const three = (value) => value.toFixed(3).replace(/^0\./, ".");
@@ -275,17 +275,17 @@ async function result() {
   }
   rows.rows[1].className = "random";
   const { hits, of } = summary.row.accuracy;
-  element("verdict").textContent = `${hits} of ${of} answers were right; guessing gives about ${Math.round(of / 2)}.`;
-  const { half_width, trials } = summary.claim;
+  element("verdict").textContent = `${hits} of ${of} answers were correct; guessing gives about ${Math.round(of / 2)}.`;
+  const { half_width, trials } = summary.precision;
   element("claim").textContent =
-    `To know a fraction to ±${Math.round(100 * half_width)} points takes ${trials} trials, of one subject or of several pooled.`;
+    `An accuracy of ±${Math.round(100 * half_width)} percentage points needs ${trials} trials, from one subject or several pooled.`;
   const groups = element("breakdown").tBodies[0];
   groups.replaceChildren();
   let before;
   for (const { side, parameter, value, correct } of summary.breakdown) {
     const row = groups.insertRow();
     const name = `${side}: ${parameter}`;
-    const texts = [name === before ? "" : name, value, `${correct.hits} of ${correct.of}`, interval(correct.wilson_95)];
+    const texts = [name === before ? "" : name, value, `${correct.hits} of ${correct.total}`, interval(correct.wilson_95)];
     if (name !== before) row.className = "begins";
     before = name;
     for (const text of texts) cell(row, text);
@@ -324,5 +324,5 @@ document.addEventListener("keydown", (event) => {
   await load();
   if (isFresh()) welcome();
   else if (state.finished || state.shown) next();
-  else rest("Welcome back", "Every answer is kept.");
+  else rest("Welcome back", "All answers are saved.");
 })();

@@ -1,9 +1,9 @@
 "use strict";
 
-// The middle of the canvas is (view.x, view.y) in pixels of the picture, each of which has view.zoom pixels of the page. Of every
-// tile in view the level that suits the zoom is asked for; until it is here, its part of a coarser one stands for it.
+// The centre of the canvas is (view.x, view.y) in image pixels; view.zoom is the number of page pixels per image pixel. Tiles of the
+// level that suits the zoom are requested; until they arrive, coarser ones are drawn.
 
-/** Tiles that are asked for at a time, that are kept; the largest zoom; how far the pointer may move in a click. */
+/** Parallel requests; cached tiles; maximum zoom; pointer movement allowed in a click; retry interval. */
 const [AT_ONCE, KEPT, NEAREST, CLICK_PX, RETRY_MS] = [6, 400, 32, 4, 2000];
 
 const canvas = element("canvas");
@@ -11,23 +11,23 @@ const context = canvas.getContext("2d");
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
 let info = null;
-let picture = null;
+let image = null;
 const view = { number: 0, plane: 0, x: 0, y: 0, zoom: 1 };
 
-/** The plane that was shown before: it stands in while the next one is on its way. */
+/** The previous plane, drawn while the next one loads. */
 let before = 0;
 
-/** Whether the labels of a group are shown, and how opaque. */
+/** Visibility and opacity of each label group. */
 const groups = new Map();
 
-/** Where was clicked. */
+/** The clicked pixel. */
 let mark = null;
 
-/** Tiles by their address: an image, "asked", "absent" or "broken". The last that were used are the last. */
+/** Tiles by address: an image, "asked", "absent" or "broken"; least recently used first. */
 const tiles = new Map();
 let underway = 0;
 
-// What is asked
+// Requests
 
 function say(text) {
   element("message").textContent = text;
@@ -42,7 +42,7 @@ async function load(address) {
     tiles.set(address, await createImageBitmap(await response.blob()));
   } catch (error) {
     tiles.set(address, error.status === 404 ? "absent" : "broken");
-    if (error.status !== 404) say(error.status ? error.message : "The program does not answer. It is asked again.");
+    if (error.status !== 404) say(error.status ? error.message : "The program does not respond. Retrying.");
     if (!error.status) {
       await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
       tiles.delete(address);
@@ -53,7 +53,7 @@ async function load(address) {
   redraw();
 }
 
-/** A tile if it is here; it counts as used. */
+/** Returns a loaded tile and marks it as used. */
 function ready(address) {
   const tile = tiles.get(address);
   if (!(tile instanceof ImageBitmap)) return null;
@@ -62,7 +62,7 @@ function ready(address) {
   return tile;
 }
 
-/** Lets the tiles go that were not used for longest; those of two views may always stay. */
+/** Evicts the least recently used tiles; those of two views always stay. */
 function forget(needed) {
   for (const [address, tile] of tiles) {
     if (tiles.size <= Math.max(KEPT, 2 * needed)) return;
@@ -72,26 +72,26 @@ function forget(needed) {
   }
 }
 
-// What is drawn
+// Drawing
 
 const addressOf = (layer, level, row, column) => `${layer}/${level}/${row}-${column}.png`;
 const planeLayer = (plane) => `tile/${view.number}/${plane}`;
 
-/** A column and a row of the picture in pixels of the screen; whole ones, so that tiles meet without a seam. */
+/** Converts image to screen coordinates, rounded so that tiles join without a seam. */
 const onScreenX = (x) => Math.round(((x - view.x) * view.zoom + canvas.clientWidth / 2) * devicePixelRatio);
 const onScreenY = (y) => Math.round(((y - view.y) * view.zoom + canvas.clientHeight / 2) * devicePixelRatio);
 
-/** The level whose pixels are at most as large as those of the screen, or the finest. */
-const levelNow = () => clamp(Math.floor(1e-6 - Math.log2(view.zoom * devicePixelRatio)), 0, picture.levels - 1);
+/** Returns the level whose pixels are at most as large as screen pixels, or the finest. */
+const levelNow = () => clamp(Math.floor(1e-6 - Math.log2(view.zoom * devicePixelRatio)), 0, image.levels - 1);
 
-/** The tiles of a level in view, those in the middle first. */
+/** Returns the visible tiles of a level, those nearest to the centre first. */
 function inView(level) {
-  const side = picture.tile * 2 ** level;
+  const side = image.tile * 2 ** level;
   const [across, down] = [canvas.clientWidth / view.zoom / 2, canvas.clientHeight / view.zoom / 2];
   const along = (middle, half, end) =>
     [Math.floor(clamp(middle - half, 0, end - 1) / side), Math.floor(clamp(middle + half, 0, end - 1) / side)];
-  const [left, right] = along(view.x, across, picture.width);
-  const [top, bottom] = along(view.y, down, picture.height);
+  const [left, right] = along(view.x, across, image.width);
+  const [top, bottom] = along(view.y, down, image.height);
   const found = [];
   for (let row = top; row <= bottom; row += 1) {
     for (let column = left; column <= right; column += 1) found.push([row, column]);
@@ -100,16 +100,16 @@ function inView(level) {
   return found.sort((a, b) => far(a) - far(b));
 }
 
-/** Draws the part of a picture's layer under a tile: the tile, or its part of the nearest coarser one that is here. */
+/** Draws a tile, or the matching part of the finest coarser tile that is loaded. */
 function drawTile(layers, level, row, column) {
-  const side = picture.tile;
+  const side = image.tile;
   const [left, top] = [column * side, row * side];
-  const [width, height] = [picture.width, picture.height].map((full) => Math.ceil(full / 2 ** level));
+  const [width, height] = [image.width, image.height].map((full) => Math.ceil(full / 2 ** level));
   const [right, bottom] = [Math.min(left + side, width), Math.min(top + side, height)];
   const [x0, y0] = [onScreenX(left * 2 ** level), onScreenY(top * 2 ** level)];
-  const x1 = onScreenX(Math.min(right * 2 ** level, picture.width));
-  const y1 = onScreenY(Math.min(bottom * 2 ** level, picture.height));
-  for (let up = 0; level + up < picture.levels; up += 1) {
+  const x1 = onScreenX(Math.min(right * 2 ** level, image.width));
+  const y1 = onScreenY(Math.min(bottom * 2 ** level, image.height));
+  for (let up = 0; level + up < image.levels; up += 1) {
     const [over, beside] = [row >> up, column >> up];
     for (const layer of layers) {
       const tile = ready(addressOf(layer, level + up, over, beside));
@@ -131,7 +131,7 @@ function redraw() {
   drawing = true;
   requestAnimationFrame(() => {
     drawing = false;
-    if (picture) draw();
+    if (image) draw();
   });
 }
 
@@ -139,13 +139,13 @@ function draw() {
   const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((side) => Math.round(side * devicePixelRatio));
   if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
   context.clearRect(0, 0, width, height);
-  // Where the picture lies, also where nothing of it is made yet.
+  // Background of the image, visible where tiles are missing.
   const [x, y] = [onScreenX(0), onScreenY(0)];
   context.fillStyle = "#24282d";
-  context.fillRect(x, y, onScreenX(picture.width) - x, onScreenY(picture.height) - y);
+  context.fillRect(x, y, onScreenX(image.width) - x, onScreenY(image.height) - y);
   const layers = [[[planeLayer(view.plane), planeLayer(before)], 1]];
   for (const [name, { on, opacity }] of groups) if (on) layers.push([[`label/${view.number}/${name}`], opacity]);
-  const [level, coarsest] = [levelNow(), picture.levels - 1];
+  const [level, coarsest] = [levelNow(), image.levels - 1];
   const [fine, coarse] = [inView(level), inView(coarsest)];
   const needed = [];
   for (const [[layer]] of layers) {
@@ -161,9 +161,9 @@ function draw() {
   const isHere = needed.every((address) => tiles.has(address) && tiles.get(address) !== "asked");
   if (isHere) {
     before = view.plane;
-    // The planes beside this one will be asked for next.
+    // Preloads the neighbouring planes.
     for (const plane of [view.plane - 1, view.plane + 1]) {
-      if (!(plane in picture.planes_um)) continue;
+      if (!(plane in image.planes_um)) continue;
       for (const [row, column] of fine) needed.push(addressOf(planeLayer(plane), level, row, column));
     }
   }
@@ -191,11 +191,11 @@ function drawMark() {
 
 /** A bar of 1, 2 or 5 times a power of ten, at most 160 pixels long. */
 function drawScale() {
-  const most = (160 * picture.pixel_um) / view.zoom;
+  const most = (160 * image.pixel_um) / view.zoom;
   const power = 10 ** Math.floor(Math.log10(most));
   const um = [5, 2, 1].map((times) => times * power).find((length) => length <= most) ?? power;
   const text = um >= 1000 ? `${um / 1000} mm` : `${Number(um.toPrecision(1))} µm`;
-  element("scale-bar").style.width = `${(um / picture.pixel_um) * view.zoom}px`;
+  element("scale-bar").style.width = `${(um / image.pixel_um) * view.zoom}px`;
   element("scale-text").textContent = text;
   element("scale").setAttribute("aria-label", `Scale bar of ${text}`);
 }

@@ -1,25 +1,25 @@
 "use strict";
 
-// What hands and keys do, and what the panel says. What is shown of it, tiles.js draws.
+// Input handling and the side panel. tiles.js draws the canvas.
 
-// Where one looks
+// View position
 
 function fit() {
-  Object.assign(view, { x: picture.width / 2, y: picture.height / 2, zoom: farthest() });
+  Object.assign(view, { x: image.width / 2, y: image.height / 2, zoom: farthest() });
   redraw();
 }
 
-/** The zoom that shows all of the picture. */
+/** The zoom that shows all of the image. */
 const farthest = () =>
-  Math.max(0.96 * Math.min(canvas.clientWidth / picture.width, canvas.clientHeight / picture.height), 1e-6);
+  Math.max(0.96 * Math.min(canvas.clientWidth / image.width, canvas.clientHeight / image.height), 1e-6);
 
 function move(dx, dy) {
-  view.x = clamp(view.x + dx / view.zoom, 0, picture.width);
-  view.y = clamp(view.y + dy / view.zoom, 0, picture.height);
+  view.x = clamp(view.x + dx / view.zoom, 0, image.width);
+  view.y = clamp(view.y + dy / view.zoom, 0, image.height);
   redraw();
 }
 
-/** Zooms so that the place under a point of the canvas stays there. */
+/** Zooms around a point of the canvas. */
 function zoomBy(factor, x = canvas.clientWidth / 2, y = canvas.clientHeight / 2) {
   const [dx, dy] = [x - canvas.clientWidth / 2, y - canvas.clientHeight / 2];
   const zoom = clamp(view.zoom * factor, Math.min(farthest(), 1) / 2, NEAREST);
@@ -29,51 +29,51 @@ function zoomBy(factor, x = canvas.clientWidth / 2, y = canvas.clientHeight / 2)
   move(0, 0);
 }
 
-/** What the panel says of the plane in view. */
+/** Panel entries that depend on the plane. */
 let perPlane = [];
 
 function showPlane(plane) {
-  view.plane = clamp(plane, 0, Math.max(picture.planes_um.length - 1, 0));
+  view.plane = clamp(plane, 0, Math.max(image.planes_um.length - 1, 0));
   element("plane").value = view.plane;
-  const um = picture.planes_um[view.plane] ?? 0;
+  const um = image.planes_um[view.plane] ?? 0;
   const text = `${minus(um, 2)} µm`;
   element("plane").setAttribute("aria-valuetext", text);
-  element("plane-text").textContent = `${text} · ${view.plane + 1} of ${picture.planes_um.length}`;
+  element("plane-text").textContent = `${text} · ${view.plane + 1} of ${image.planes_um.length}`;
   for (const { node, values, unit } of perPlane) node.textContent = ofPlane(values, unit);
   redraw();
 }
 
-/** The number of the picture that was asked for last. */
+/** Number of the image that was requested last. */
 let wanted = 0;
 
-/** Shows a picture, all of it unless it is told where to look. */
-async function showPicture(number, place) {
+/** Shows an image at `place`, or all of it. */
+async function showImage(number, place) {
   wanted = number;
   try {
-    const next = await (await request(`picture/${number}`)).json();
+    const next = await (await request(`image/${number}`)).json();
     if (wanted !== number) return;
     say("");
-    // The same place of pictures of the same size, so that they can be compared.
-    const stays = picture && next.width === picture.width && next.height === picture.height;
-    picture = next;
+    // Keeps the position between images of the same size, to compare them.
+    const stays = image && next.width === image.width && next.height === image.height;
+    image = next;
     view.number = number;
     [mark, perPlane] = [null, []];
-    element("objects").replaceChildren(made("p", "Click on something to see what it is.", "quiet"));
+    element("objects").replaceChildren(made("p", "Click an object for details.", "quiet"));
     element("here-at").textContent = "";
-    element("name").textContent = picture.name;
+    element("name").textContent = image.name;
     element("number").value = number + 1;
     element("previous").disabled = number === 0;
-    element("next").disabled = number + 1 >= info.pictures;
-    const um = [picture.width, picture.height].map((px) => px * picture.pixel_um);
+    element("next").disabled = number + 1 >= info.images;
+    const um = [image.width, image.height].map((px) => px * image.pixel_um);
     const [unit, digits, name] = Math.max(...um) < 1000 ? [1, 0, "µm"] : [1000, 2, "mm"];
     const size = `${um.map((side) => (side / unit).toFixed(digits)).join(" × ")} ${name}`;
-    const focus = picture.planes_um.length === 0 ? " · everything in focus" : "";
-    element("about").textContent = `${picture.width} × ${picture.height} px · ${size}${focus}`;
-    element("focus").hidden = picture.planes_um.length < 2;
-    element("plane").max = Math.max(picture.planes_um.length - 1, 0);
+    const focus = image.planes_um.length === 0 ? " · extended depth of field" : "";
+    element("about").textContent = `${image.width} × ${image.height} px · ${size}${focus}`;
+    element("focus").hidden = image.planes_um.length < 2;
+    element("plane").max = Math.max(image.planes_um.length - 1, 0);
     if (place) Object.assign(view, place, { zoom: clamp(place.zoom, farthest() / 2, NEAREST) });
     else if (!stays) fit();
-    const middle = Math.floor(picture.planes_um.length / 2);
+    const middle = Math.floor(image.planes_um.length / 2);
     showPlane(place?.plane ?? (stays ? view.plane : middle));
     before = view.plane;
     move(0, 0);
@@ -84,20 +84,20 @@ async function showPicture(number, place) {
 }
 
 const go = (number) => {
-  const there = clamp(number, 0, info.pictures - 1);
-  if (there !== wanted) showPicture(there);
+  const there = clamp(number, 0, info.images - 1);
+  if (there !== wanted) showImage(there);
 };
 
 let keeping = 0;
 
-/** The address as this page left it. */
+/** The URL fragment that this page set last. */
 let kept = "";
 
-/** Keeps place and labels in the address, so that it can be loaded anew and handed on. */
+/** Stores position and labels in the URL fragment, so that the view can be reloaded and shared. */
 function keepPlace() {
   clearTimeout(keeping);
   keeping = setTimeout(() => {
-    // Somebody has typed another, which is being looked at.
+    // The user entered another fragment, which is being loaded.
     if (location.hash !== kept) return;
     const shown = [...groups].filter(([, { on }]) => on);
     const labels = shown.map(([name, { opacity }]) => `${name}:${Math.round(opacity * 100)}`).join(",");
@@ -118,10 +118,10 @@ function keptPlace() {
   }
   if (![number, plane, x, y, zoom].every(Number.isFinite) || zoom <= 0) return { number: 0 };
   const place = { plane: Math.floor(plane), x, y, zoom };
-  return { number: clamp(Math.floor(number), 0, info.pictures - 1), place };
+  return { number: clamp(Math.floor(number), 0, info.images - 1), place };
 }
 
-// What lies there
+// Object details
 
 function made(tag, text, className) {
   const node = document.createElement(tag);
@@ -152,9 +152,9 @@ function card(object) {
     planes("defocus", object.defocus_um, " µm");
     planes("contrast / noise", object.detectability, "");
     row("area", `${object.area_um2.toFixed(object.area_um2 < 100 ? 1 : 0)} µm²`);
-    row("stain", object.stain.toFixed(2));
+    row("absorbance", object.mean_absorbance.toFixed(2));
     row("cluster", object.cluster || "");
-    const hints = [object.front ? "" : "behind another", object.truncated ? "cut by the border" : ""].filter(Boolean);
+    const hints = [object.visible ? "" : "partly hidden", object.truncated ? "cut by the border" : ""].filter(Boolean);
     row("", hints.join(", "));
   }
   node.append(heading, list);
@@ -162,7 +162,7 @@ function card(object) {
 }
 
 async function look(x, y) {
-  if (x < 0 || y < 0 || x >= picture.width || y >= picture.height) return;
+  if (x < 0 || y < 0 || x >= image.width || y >= image.height) return;
   mark = { x, y };
   redraw();
   element("here-at").textContent = `${x}, ${y} px`;
@@ -170,14 +170,14 @@ async function look(x, y) {
     const { objects } = await (await request(`at/${view.number}/${x}/${y}`)).json();
     if (mark?.x !== x || mark?.y !== y) return;
     perPlane = [];
-    const nodes = objects.length ? objects.map(card) : [made("p", "Nothing but the slide.", "quiet")];
+    const nodes = objects.length ? objects.map(card) : [made("p", "No object here.", "quiet")];
     element("objects").replaceChildren(...nodes);
   } catch (error) {
     element("objects").replaceChildren(made("p", error.message, "quiet"));
   }
 }
 
-// Hands and keys
+// Pointer and keyboard
 
 const placeOf = (event) => {
   const box = canvas.getBoundingClientRect();
@@ -185,7 +185,7 @@ const placeOf = (event) => {
   return { x, y, px: view.x + (x - box.width / 2) / view.zoom, py: view.y + (y - box.height / 2) / view.zoom };
 };
 
-/** Fingers, or the mouse, that are down. */
+/** Active pointers. */
 const down = new Map();
 let travelled = 0;
 
@@ -197,7 +197,7 @@ canvas.addEventListener("pointerdown", (event) => {
 });
 
 canvas.addEventListener("pointermove", (event) => {
-  if (!picture) return;
+  if (!image) return;
   const to = placeOf(event);
   const from = down.get(event.pointerId);
   if (from) {
@@ -213,14 +213,14 @@ canvas.addEventListener("pointermove", (event) => {
     down.set(event.pointerId, to);
   }
   const [x, y] = [placeOf(event).px, placeOf(event).py];
-  const um = (px) => minus(px * picture.pixel_um, 1);
+  const um = (px) => minus(px * image.pixel_um, 1);
   element("position").textContent = `${Math.floor(x)}, ${Math.floor(y)} px · ${um(x)}, ${um(y)} µm`;
 });
 
 const release = (event) => {
   const was = down.delete(event.pointerId);
   if (down.size === 0) canvas.classList.remove("dragged");
-  if (!was || event.type !== "pointerup" || travelled > CLICK_PX || !picture) return;
+  if (!was || event.type !== "pointerup" || travelled > CLICK_PX || !image) return;
   const { px, py } = placeOf(event);
   look(Math.floor(px), Math.floor(py));
 };
@@ -229,8 +229,8 @@ canvas.addEventListener("pointercancel", release);
 
 canvas.addEventListener("wheel", (event) => {
   event.preventDefault();
-  if (!picture) return;
-  // With Shift some systems turn the wheel sideways.
+  if (!image) return;
+  // Some systems scroll horizontally with Shift.
   const turn = (event.deltaY || event.deltaX) * [1, 33, 400][event.deltaMode];
   const { x, y } = placeOf(event);
   if (event.shiftKey) showPlane(view.plane - Math.sign(turn));
@@ -250,8 +250,8 @@ const KEYS = {
 };
 
 document.addEventListener("keydown", (event) => {
-  if (!picture || event.ctrlKey || event.metaKey || event.altKey) return;
-  // A slider and a number have arrows of their own.
+  if (!image || event.ctrlKey || event.metaKey || event.altKey) return;
+  // Sliders and number fields handle arrow keys themselves.
   if (event.target instanceof HTMLInputElement && event.target.type !== "checkbox") return;
   const group = [...groups.keys()][Number(event.key) - 1];
   const act = group ? () => setGroup(group, !groups.get(group).on) : Object.hasOwn(KEYS, event.key) && KEYS[event.key];
@@ -286,35 +286,35 @@ element("next").addEventListener("click", next);
 element("number").addEventListener("change", ({ target }) => go(Math.floor(Number(target.value) || 1) - 1));
 new ResizeObserver(redraw).observe(canvas);
 
-// What was not there may have been made since.
+// Missing tiles may have been written since.
 addEventListener("focus", () => {
   for (const [address, tile] of tiles) if (tile === "absent" || tile === "broken") tiles.delete(address);
   redraw();
 });
 addEventListener("hashchange", () => {
   const { number, place } = keptPlace();
-  showPicture(number, place);
+  showImage(number, place);
 });
 
 async function begin() {
   try {
     info = await (await request("info")).json();
   } catch (error) {
-    say(error.status ? error.message : "The program does not answer.");
+    say(error.status ? error.message : "The program does not respond.");
     return;
   }
   document.title = `${info.title} – papsynth view`;
   element("title").textContent = info.title;
-  element("count").textContent = info.pictures;
-  element("number").max = info.pictures;
-  element("pictures").hidden = info.pictures < 2;
+  element("count").textContent = info.images;
+  element("number").max = info.images;
+  element("images").hidden = info.images < 2;
   info.groups.forEach(addGroup);
-  if (info.pictures === 0) {
-    say("There is no picture yet.");
+  if (info.images === 0) {
+    say("No image yet.");
     return;
   }
   const { number, place } = keptPlace();
-  await showPicture(number, place);
+  await showImage(number, place);
 }
 
 begin();

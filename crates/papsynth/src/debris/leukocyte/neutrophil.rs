@@ -1,101 +1,113 @@
-//! Neutrophils: a lobed nucleus in a pale, ragged cytoplasm that is often drawn out to one side.
+//! Neutrophils: a lobed nucleus in a pale, irregular cytoplasm that is often elongated to one side.
 
 use super::Leukocyte;
 use crate::debris::prelude::*;
 
-/// Corners of a cytoplasm's outline before it is smoothed, and points between two of them.
+/// Corners of the cytoplasm outline before smoothing.
 const CORNERS: usize = 14;
-const BETWEEN: usize = 4;
+/// Curve points per corner.
+const POINTS_PER_CORNER: usize = 4;
 
-/// How much the corners' distances from the middle vary, of a whole cytoplasm and of a frayed one.
+/// Relative standard deviation of the radius of the corners of an intact cytoplasm.
 const RAGGED: f64 = 0.06;
+/// The same for a frayed cytoplasm.
 const FRAYED: f64 = 0.13;
 
-/// Share of the cytoplasms that are drawn out, and by how much of their radius.
-const DRAWN_OUT: f64 = 0.45;
+/// Probability of a tail.
+const TAIL_PROBABILITY: f64 = 0.45;
+/// Length of a tail relative to the radius: minimum, maximum.
 const TAIL: [f64; 2] = [0.15, 0.65];
 
-/// Distance of neighbouring lobes in radii of a lobe, and the angle by which the row of lobes turns at each.
+/// Distance of neighbouring lobes, in radii of a lobe: minimum, maximum.
 const STEP: [f64; 2] = [1.15, 1.6];
+/// Change of direction of the row at each lobe, radians: minimum, maximum.
 const TURN: [f64; 2] = [0.5, 1.5];
 
 /// Half-width of the bridge between two lobes, in radii of a lobe.
 const BRIDGE: f64 = 0.42;
 
-/// Absorbance at a lobe's rim relative to its middle: lobes are balls that dried flat; smudged ones have lost their edge.
+/// Absorbance at the rim of a lobe relative to its centre.
 const RIM: f64 = 0.7;
+/// The same for a smudged nucleus.
 const SMUDGED_RIM: f64 = 0.4;
 
-/// Strengths of texture: clumps of chromatin, and of degenerated ones; granules and vacuoles of the cytoplasm.
+/// Strength of the chromatin texture.
 const CHROMATIN: f32 = 0.10;
+/// Strength of the chromatin texture of a degenerated nucleus.
 const SMUDGED: f32 = 0.14;
+/// Strength of the cytoplasm texture.
 const VACUOLES: f32 = 0.2;
 
-/// Sizes (standard deviations) of clumps and vacuoles, µm.
+/// Size (standard deviation) of clumps of chromatin, µm.
 const CLUMP_UM: f64 = 0.45;
+/// Size (standard deviation) of vacuoles, µm.
 const VACUOLE_UM: f64 = 0.3;
 
-/// Width of the darker border of the cytoplasm, µm, and how much darker it is.
+/// Width of the darker border of the cytoplasm, µm.
 const BORDER_UM: f64 = 0.5;
+/// Relative increase of absorbance in the border.
 const BORDER: f32 = 0.2;
 
-pub(super) fn make(leukocyte: &Leukocyte, site: &Site<'_>) -> Phantom {
-    let mut rng = site.stream("shape");
-    let cell_radius = 0.5 * leukocyte.cell_um;
-    let tail = if random::chance(DRAWN_OUT, &mut rng) { random::between(TAIL[0], TAIL[1], &mut rng) } else { 0.0 };
+pub(super) fn make(leukocyte: &Leukocyte, context: &ObjectContext<'_>) -> Phantom {
+    let mut rng = context.stream("shape");
+    let cell_radius = 0.5 * leukocyte.cytoplasm_diameter_um;
+    let tail =
+        if random::chance(TAIL_PROBABILITY, &mut rng) { random::between(TAIL[0], TAIL[1], &mut rng) } else { 0.0 };
     let toward = random::direction(&mut rng);
     let body = cytoplasm(leukocyte, cell_radius, tail, toward, &mut rng);
     let lobes = lobes(leukocyte, cell_radius, &mut rng);
-    // The nucleus stays behind where the cytoplasm is drawn out.
+    // The nucleus is on the side opposite to the tail.
     let shift = -0.35 * tail * cell_radius + 0.08 * cell_radius * random::normal(&mut rng);
     let at = [shift * libm::cos(toward), shift * libm::sin(toward)];
-    let outline = site.places(&body);
+    let outline = context.curve_to_grid(&body);
     let shapes: Vec<Vec<Point>> = lobes
         .iter()
         .map(|lobe| {
-            let shape = wobbled_circle(lobe.radius, leukocyte.alpha, leukocyte.beta, &mut rng);
+            let shape = perturbed_circle(lobe.radius, leukocyte.alpha, leukocyte.beta, &mut rng);
             let stretch = |p: &Point| [p[0] * lobe.stretch, p[1] / lobe.stretch];
             let turned = shape.iter().map(|p| placed(stretch(p), lobe.heading, lobe.centre));
-            turned.map(|p| site.place([p[0] + at[0], p[1] + at[1]])).collect()
+            turned.map(|p| context.to_grid([p[0] + at[0], p[1] + at[1]])).collect()
         })
         .collect();
 
-    let mut painting = site.painting(outline.iter().chain(shapes.iter().flatten()), 0.0);
-    painting.coverage.cover(&outline);
-    for (value, share) in border(&painting.coverage, &outline, site).values.iter().zip(&mut painting.absorbance.values)
+    let mut canvas = context.canvas(outline.iter().chain(shapes.iter().flatten()), 0.0);
+    canvas.coverage.cover(&outline);
+    for (value, absorbance) in
+        border(&canvas.coverage, &outline, context).values.iter().zip(&mut canvas.absorbance.values)
     {
-        *share = leukocyte.halo as f32 * value;
+        *absorbance = leukocyte.cytoplasm_absorbance as f32 * value;
     }
     if leukocyte.degenerated {
-        strands(&mut painting, site, cell_radius, leukocyte.halo, &mut rng);
+        shreds(&mut canvas, context, cell_radius, leukocyte.cytoplasm_absorbance, &mut rng);
     }
-    let look = Look::clouds(site.px(VACUOLE_UM), &mut rng);
-    painting.texture(site.pools.clouds(), &look, VACUOLES);
+    let sampler = FieldSampler::clouds(context.px(VACUOLE_UM), &mut rng);
+    canvas.texture(context.noise_fields.clouds(), &sampler, VACUOLES);
 
-    let mut nucleus = painting.blank();
+    let mut nucleus = canvas.blank();
     for shape in &shapes {
         nucleus.coverage.cover(shape);
     }
     for pair in lobes.windows(2) {
-        let ends = [0, 1].map(|i| site.place([pair[i].centre[0] + at[0], pair[i].centre[1] + at[1]]));
-        let half_width = site.px(BRIDGE * pair[0].radius.min(pair[1].radius));
+        let ends = [0, 1].map(|i| context.to_grid([pair[i].centre[0] + at[0], pair[i].centre[1] + at[1]]));
+        let half_width = context.px(BRIDGE * pair[0].radius.min(pair[1].radius));
         nucleus.stroke(&Stroke::even(ends[0], ends[1], half_width), 0.0);
     }
     domed(&mut nucleus, &shapes, leukocyte);
-    let look = Look::clouds(site.px(CLUMP_UM), &mut rng);
-    nucleus.texture(site.pools.clouds(), &look, if leukocyte.degenerated { SMUDGED } else { CHROMATIN });
-    for (cover, inside) in painting.coverage.values.iter_mut().zip(&nucleus.coverage.values) {
+    let sampler = FieldSampler::clouds(context.px(CLUMP_UM), &mut rng);
+    nucleus.texture(context.noise_fields.clouds(), &sampler, if leukocyte.degenerated { SMUDGED } else { CHROMATIN });
+    for (cover, inside) in canvas.coverage.values.iter_mut().zip(&nucleus.coverage.values) {
         *cover = cover.max(*inside);
     }
-    let mut phantom =
-        painting.finish(leukocyte.dyes, 0.0, leukocyte.halo).stained(nucleus.absorbance, site.dyes.nucleus);
+    let mut phantom = canvas
+        .into_phantom(leukocyte.dyes, 0.0, leukocyte.cytoplasm_absorbance)
+        .with_inclusion(nucleus.absorbance, context.dyes.nucleus);
     if leukocyte.degenerated {
         phantom.traits.push(Trait::Degenerated);
     }
     phantom
 }
 
-/// The outline of the cytoplasm, µm from its middle.
+/// Draws the outline of the cytoplasm, µm from its centre.
 fn cytoplasm(leukocyte: &Leukocyte, radius: f64, tail: f64, toward: f64, rng: &mut Stream) -> Vec<Point> {
     let ragged = if leukocyte.degenerated { FRAYED } else { RAGGED };
     let squeeze = random::between(0.85, 1.0, rng);
@@ -108,22 +120,23 @@ fn cytoplasm(leukocyte: &Leukocyte, radius: f64, tail: f64, toward: f64, rng: &m
             [reach * libm::cos(angle), squeeze * reach * libm::sin(angle)]
         })
         .collect();
-    smooth(&corners, BETWEEN)
+    smooth(&corners, POINTS_PER_CORNER)
 }
 
 /// A lobe of a nucleus, µm.
 struct Lobe {
     centre: Point,
     radius: f64,
-    /// The way the row of lobes runs, and how much longer the lobe is that way than across.
+    /// Direction of the row of lobes, radians.
     heading: f64,
+    /// Elongation along this direction.
     stretch: f64,
 }
 
-/// A bent row of lobes about the middle of the nucleus.
+/// Draws a bent row of lobes about the centre of the nucleus.
 fn lobes(leukocyte: &Leukocyte, cell_radius: f64, rng: &mut Stream) -> Vec<Lobe> {
     let count = if leukocyte.degenerated { 1 } else { leukocyte.lobes };
-    // Neighbours overlap, so that a row of them covers less than all of them.
+    // Lobes overlap, so their radius is increased to keep the total area.
     let radius = leukocyte.radius_um / (count as f64).sqrt() * if count > 1 { 1.12 } else { 1.0 };
     let bend = random::between(TURN[0], TURN[1], rng) * if random::chance(0.5, rng) { 1.0 } else { -1.0 };
     let mut heading = random::direction(rng);
@@ -144,7 +157,7 @@ fn lobes(leukocyte: &Leukocyte, cell_radius: f64, rng: &mut Stream) -> Vec<Lobe>
     for lobe in &mut lobes {
         lobe.centre = [lobe.centre[0] - middle[0], lobe.centre[1] - middle[1]];
     }
-    // However long the row, the nucleus stays inside the cell.
+    // Shrinks the row to fit inside the cell.
     let reach = |l: &Lobe| (l.centre[0] * l.centre[0] + l.centre[1] * l.centre[1]).sqrt() + l.radius;
     let widest = lobes.iter().map(reach).fold(0.0, f64::max);
     let shrink = (0.9 * cell_radius / widest).min(1.0);
@@ -155,11 +168,11 @@ fn lobes(leukocyte: &Leukocyte, cell_radius: f64, rng: &mut Stream) -> Vec<Lobe>
     lobes
 }
 
-/// The cytoplasm, 1 inside and darker along its border.
-fn border(coverage: &Tile, outline: &[Point], site: &Site<'_>) -> Tile {
+/// Returns the relative absorbance of the cytoplasm: 1 inside and larger along its border.
+fn border(coverage: &Tile, outline: &[Point], context: &ObjectContext<'_>) -> Tile {
     let middle = fsd_shape::centroid(outline);
     let radius = (area(outline) / core::f64::consts::PI).sqrt();
-    let shrink = (1.0 - site.px(BORDER_UM) / radius).max(0.0);
+    let shrink = (1.0 - context.px(BORDER_UM) / radius).max(0.0);
     let inner: Vec<Point> = outline
         .iter()
         .map(|p| [middle[0] + shrink * (p[0] - middle[0]), middle[1] + shrink * (p[1] - middle[1])])
@@ -172,31 +185,31 @@ fn border(coverage: &Tile, outline: &[Point], site: &Site<'_>) -> Tile {
     inside
 }
 
-/// Shreds that hang out of a degenerated cell.
-fn strands(painting: &mut Painting, site: &Site<'_>, radius: f64, halo: f64, rng: &mut Stream) {
+/// Adds shreds to a degenerated cell.
+fn shreds(canvas: &mut ObjectCanvas, context: &ObjectContext<'_>, radius: f64, absorbance: f64, rng: &mut Stream) {
     for _ in 0..1 + random::below(3, rng) {
         let angle = random::direction(rng);
         let reach = radius * random::between(1.0, 1.25, rng);
         let bend = angle + 0.5 * random::normal(rng);
-        let ends = [0.5 * radius, reach].map(|r| site.place([r * libm::cos(angle), r * libm::sin(bend)]));
-        let half_width = site.px(random::between(0.4, 1.0, rng));
-        painting.stroke(&Stroke { ends, half_widths: [half_width, 0.3 * half_width] }, halo);
+        let ends = [0.5 * radius, reach].map(|r| context.to_grid([r * libm::cos(angle), r * libm::sin(bend)]));
+        let half_width = context.px(random::between(0.4, 1.0, rng));
+        canvas.stroke(&Stroke { ends, half_widths: [half_width, 0.3 * half_width] }, absorbance);
     }
 }
 
-/// Makes a nucleus as dark as its lobes are thick where they lie over each other.
-fn domed(nucleus: &mut Painting, shapes: &[Vec<Point>], leukocyte: &Leukocyte) {
-    /// Lobes that lie over each other hide each other's stain in part.
-    const THICKEST: f64 = 1.3;
+/// Sets the absorbance of a nucleus from the summed thickness of its lobes.
+fn domed(nucleus: &mut ObjectCanvas, shapes: &[Vec<Point>], leukocyte: &Leukocyte) {
+    /// Upper limit of the thickness of overlapping lobes.
+    const MAX_THICKNESS: f64 = 1.3;
     let rim = if leukocyte.degenerated { SMUDGED_RIM } else { RIM };
-    let balls: Vec<(Point, f64)> =
+    let spheres: Vec<(Point, f64)> =
         shapes.iter().map(|lobe| (fsd_shape::centroid(lobe), area(lobe) / core::f64::consts::PI)).collect();
     nucleus.shade(|p| {
         let chord = |(centre, square): &(Point, f64)| {
             let (dx, dy) = (p[0] - centre[0], p[1] - centre[1]);
             (1.0 - (dx * dx + dy * dy) / square).max(0.0).sqrt()
         };
-        let thickness = balls.iter().map(chord).sum::<f64>().min(THICKEST);
+        let thickness = spheres.iter().map(chord).sum::<f64>().min(MAX_THICKNESS);
         leukocyte.absorbance * (rim + (1.0 - rim) * 1.2 * thickness)
     });
 }

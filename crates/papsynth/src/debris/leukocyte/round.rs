@@ -3,26 +3,27 @@
 use super::Leukocyte;
 use crate::debris::prelude::*;
 
-/// Size of the cells of the Perlin noise inside a nucleus, relative to its radius.
+/// Cell size of the Perlin noise in a nucleus, relative to its radius.
 const NOISE_CELL: f64 = 0.55;
-/// Strength of that noise relative to the absorbance.
+/// Strength of the noise relative to the absorbance.
 const NOISE_STRENGTH: f32 = 1.1;
 /// Radius of the cell relative to its nucleus.
-const HALO: f64 = 1.6;
-/// A cytoplasm fainter than this cannot be told from the background.
-const FAINTEST_HALO: f64 = 0.02;
-/// Absorbance at the rim, relative to the middle: a nucleus is a ball that dries flat.
+const CYTOPLASM_RADIUS: f64 = 1.6;
+/// Minimum absorbance of a drawn cytoplasm; fainter ones are invisible.
+const MIN_CYTOPLASM_ABSORBANCE: f64 = 0.02;
+/// Absorbance at the rim relative to the centre.
 const RIM: f64 = 0.62;
 
-pub(super) fn make(leukocyte: &Leukocyte, site: &Site<'_>) -> Phantom {
-    let Leukocyte { alpha, beta, absorbance, halo, .. } = *leukocyte;
-    let mut rng = site.stream("shape");
-    let centre = site.centre;
-    let turn = site.rotation_deg.to_radians();
-    let radius = site.px(leukocyte.radius_um);
+pub(super) fn make(leukocyte: &Leukocyte, context: &ObjectContext<'_>) -> Phantom {
+    let Leukocyte { alpha, beta, absorbance, cytoplasm_absorbance, .. } = *leukocyte;
+    let mut rng = context.stream("shape");
+    let centre = context.centre;
+    let turn = context.rotation_deg.to_radians();
+    let radius = context.px(leukocyte.radius_um);
     let place = |shape: Vec<Point>| -> Vec<Point> { shape.iter().map(|p| placed(*p, turn, centre)).collect() };
-    let shape = place(wobbled_circle(radius, alpha, beta, &mut rng));
-    let body = (halo >= FAINTEST_HALO).then(|| place(wobbled_circle(radius * HALO, 0.10, 0.10, &mut rng)));
+    let shape = place(perturbed_circle(radius, alpha, beta, &mut rng));
+    let body = (cytoplasm_absorbance >= MIN_CYTOPLASM_ABSORBANCE)
+        .then(|| place(perturbed_circle(radius * CYTOPLASM_RADIUS, 0.10, 0.10, &mut rng)));
     let mut nucleus = Tile::around(shape.iter().chain(body.iter().flatten()), 2.0);
     let mut coverage = nucleus.blank();
     nucleus.cover(&shape);
@@ -32,17 +33,17 @@ pub(super) fn make(leukocyte: &Leukocyte, site: &Site<'_>) -> Phantom {
     if let Some(body) = &body {
         coverage.cover(body);
         for (value, cover) in tile.values.iter_mut().zip(&coverage.values) {
-            *value += cover * halo as f32;
+            *value += cover * cytoplasm_absorbance as f32;
         }
     }
     for (cover, inside) in coverage.values.iter_mut().zip(&nucleus.values) {
         *cover = cover.max(*inside);
     }
-    let whole = coverage.values.iter().map(|share| f64::from(*share)).sum();
-    Phantom::whole(tile, coverage, whole, site.dyes.nucleus)
+    let area_px = coverage.values.iter().map(|coverage| f64::from(*coverage)).sum();
+    Phantom::whole(tile, coverage, area_px, context.dyes.nucleus)
 }
 
-/// Makes a nucleus thicker in its middle.
+/// Multiplies a nucleus by its thickness profile, which is largest at the centre.
 fn domed(tile: &mut Tile, outline: &[Point]) {
     let (centre, square) = (fsd_shape::centroid(outline), area(outline) / core::f64::consts::PI);
     tile.for_each(|p, value| {

@@ -1,30 +1,30 @@
-//! Levels of detail on a flat sheet: clouds, flecks, grain, cytoskeleton, granules, endoplasm.
+//! Detail of cytoplasm: clouds, flecks, grain, cytoskeleton, granules, endoplasm, halo.
 
 use multiversion::multiversion;
 use voronoi_cytoskeleton::{LineParams, draw_into};
 
 use crate::error::Cause;
 use crate::key::Stream;
-use crate::phantom::making::Cell;
-use crate::phantom::pools::{Look, SIDE, Texels};
-use crate::phantom::tile::{Point, Tile, grown};
-use crate::phantom::wobble::wobbled_circle;
+use crate::phantom::cell_context::CellContext;
+use crate::phantom::noise_fields::{FieldSampler, SIDE, Texels};
+use crate::phantom::parametric_shape::perturbed_circle;
+use crate::phantom::tile::{Point, Tile, scaled_about};
 use crate::random;
 
-/// Radius of a granule, µm (the standard deviation of its absorbance).
+/// Radius of a granule, µm (standard deviation of its absorbance).
 const GRANULE_UM: f64 = 0.28;
 
-/// Absorbance of a granule relative to the cytoplasm's.
+/// Absorbance of a granule relative to the cytoplasm.
 const GRANULE: f64 = 0.75;
 
-/// The first two levels of detail, and the grain: factors on the thickness.
-pub(super) fn add_detail(absorbance: &mut Tile, coverage: &Tile, cell: &Cell<'_>, rng: &mut Stream) {
-    let (detail, pools, pixel_um) = (&cell.body.detail, cell.pools, cell.pixel_um());
-    let clouds = Look::clouds(detail.clouds_um / pixel_um, rng);
-    let flecks = Look::fine(pixel_um, rng);
-    let grain = Look::fine(pixel_um, rng);
+/// Multiplies the thickness by clouds, flecks and grain.
+pub(super) fn add_detail(absorbance: &mut Tile, coverage: &Tile, cell: &CellContext<'_>, rng: &mut Stream) {
+    let (detail, noise_fields, pixel_um) = (&cell.body.detail, cell.noise_fields, cell.pixel_um());
+    let clouds = FieldSampler::clouds(detail.clouds_um / pixel_um, rng);
+    let flecks = FieldSampler::fine(pixel_um, rng);
+    let grain = FieldSampler::fine(pixel_um, rng);
     let (cloud, fleck, grainy) = (detail.clouds as f32, detail.flecks as f32, detail.grain as f32);
-    let threshold = if fleck > 0.0 { pools.flecks().quantile(detail.flecks_threshold) } else { 0.0 };
+    let threshold = if fleck > 0.0 { noise_fields.flecks().quantile(detail.flecks_threshold) } else { 0.0 };
     let width = absorbance.width;
     let mut buffers = vec![0.0_f32; 2 * width];
     let mut texels: Texels = [0.0; SIDE + 1];
@@ -36,22 +36,22 @@ pub(super) fn add_detail(absorbance: &mut Tile, coverage: &Tile, cell: &Cell<'_>
         let (factor, field) = (&mut factor[..row.len()], &mut field[..row.len()]);
         factor.fill(1.0);
         if cloud > 0.0 {
-            pools.clouds().row_into(field, &clouds, at, &mut texels);
+            noise_fields.clouds().row_into(field, &clouds, at, &mut texels);
             add_above(factor, field, cloud, None);
         }
         if fleck > 0.0 {
-            pools.flecks().row_into(field, &flecks, at, &mut texels);
+            noise_fields.flecks().row_into(field, &flecks, at, &mut texels);
             add_above(factor, field, fleck, Some(threshold));
         }
         if grainy > 0.0 {
-            pools.grain().row_into(field, &grain, at, &mut texels);
+            noise_fields.grain().row_into(field, &grain, at, &mut texels);
             add_above(factor, field, grainy, None);
         }
         multiply(row, factor);
     }
 }
 
-/// Adds a field, or what of it lies above a threshold.
+/// Adds a field, or its excess above a threshold.
 #[multiversion(targets = "simd")]
 fn add_above(factor: &mut [f32], field: &[f32], strength: f32, threshold: Option<f32>) {
     let zero = threshold.unwrap_or(0.0);
@@ -62,7 +62,7 @@ fn add_above(factor: &mut [f32], field: &[f32], strength: f32, threshold: Option
     }
 }
 
-/// Multiplies by factors, of which those below 0 count as 0.
+/// Multiplies by factors; negative factors count as 0.
 #[multiversion(targets = "simd")]
 fn multiply(row: &mut [f32], factors: &[f32]) {
     for (value, &factor) in row.iter_mut().zip(factors) {
@@ -70,16 +70,17 @@ fn multiply(row: &mut [f32], factors: &[f32]) {
     }
 }
 
-/// From the first pixel of a row with a share to behind the last.
+/// Returns the first covered pixel of a row and the end of the last one.
 fn covered(row: &[f32]) -> Option<(usize, usize)> {
-    let inside = |share: &f32| *share > 0.0;
+    let inside = |coverage: &f32| *coverage > 0.0;
     Some((row.iter().position(inside)?, row.iter().rposition(inside)? + 1))
 }
 
+/// Adds the fibres of the cytoskeleton.
 pub(super) fn add_cytoskeleton(
     absorbance: &mut Tile,
     outline: &[Point],
-    cell: &Cell<'_>,
+    cell: &CellContext<'_>,
     rng: &mut Stream,
 ) -> Result<(), Cause> {
     /// Width of a fibre, µm.
@@ -90,7 +91,7 @@ pub(super) fn add_cytoskeleton(
     }
     let origin = absorbance.origin.map(|o| o as f64);
     let local: Vec<Point> = outline.iter().map(|p| [p[0] - origin[0], p[1] - origin[1]]).collect();
-    let rivers = cell.studio.cytoskeletons.grow(&local, rng)?;
+    let rivers = cell.assets.cytoskeletons.grow(&local, rng)?;
     let mut lines = vec![0.0; absorbance.values.len()];
     let line = LineParams { width_px: (FIBRE_UM / cell.pixel_um()).max(1.0), ..LineParams::default() };
     draw_into(&mut lines, absorbance.width, &rivers, &line)?;
@@ -100,7 +101,7 @@ pub(super) fn add_cytoskeleton(
     Ok(())
 }
 
-/// Keratohyalin granules: small dark dots over all of the cell.
+/// Adds keratohyalin granules: small dark dots throughout the cell.
 pub(super) fn add_granules(absorbance: &mut Tile, coverage: &Tile, per_100_um2: f64, pixel_um: f64, rng: &mut Stream) {
     if per_100_um2 <= 0.0 {
         return;
@@ -108,7 +109,7 @@ pub(super) fn add_granules(absorbance: &mut Tile, coverage: &Tile, per_100_um2: 
     let area_um2 = coverage.sum() * pixel_um * pixel_um;
     let wanted = random::count(per_100_um2 * area_um2 / 100.0);
     let (width, height) = (absorbance.width, absorbance.height());
-    // As many tries as would put the wanted number inside a box that the cell fills.
+    // Granules are drawn in the bounding box, so that the expected number inside the cell is right.
     let box_um2 = (width * height) as f64 * pixel_um * pixel_um;
     let mut across = Vec::new();
     for _ in 0..random::count(wanted as f64 * box_um2 / area_um2.max(1e-9)) {
@@ -131,35 +132,35 @@ pub(super) fn add_granules(absorbance: &mut Tile, coverage: &Tile, per_100_um2: 
     }
 }
 
-/// Makes a sheet thicker towards one side, so much of its thickness a radius from its middle.
-pub(super) fn slant(absorbance: &mut Tile, centre: Point, radius_px: f64, wedge: [f64; 2]) {
-    if wedge == [0.0; 2] {
+/// Applies a linear thickness gradient: relative change per cell radius, in x and y.
+pub(super) fn apply_gradient(absorbance: &mut Tile, centre: Point, radius_px: f64, gradient: [f64; 2]) {
+    if gradient == [0.0; 2] {
         return;
     }
-    let [across, down] = wedge.map(|slope| slope / radius_px);
+    let [across, down] = gradient.map(|slope| slope / radius_px);
     let [left, top] = [0, 1].map(|axis| absorbance.origin[axis] as f64 - centre[axis]);
     for (y, row) in absorbance.values.chunks_exact_mut(absorbance.width).enumerate() {
-        slant_row(row, (1.0 + across * left + down * (top + y as f64)) as f32, across as f32);
+        scale_row(row, (1.0 + across * left + down * (top + y as f64)) as f32, across as f32);
     }
 }
 
-/// Multiplies by `first`, and by `step` more from value to value.
+/// Multiplies value i by `first + i·step`, within bounds.
 #[multiversion(targets = "simd")]
-fn slant_row(row: &mut [f32], first: f32, step: f32) {
-    /// Thinnest that a slant makes the far side, relative to the middle, and thickest the near one.
+fn scale_row(row: &mut [f32], first: f32, step: f32) {
+    /// Bounds of the factor.
     const BOUNDS: [f32; 2] = [0.35, 1.8];
     for (x, value) in row.iter_mut().enumerate() {
         *value *= (first + step * x as f32).clamp(BOUNDS[0], BOUNDS[1]);
     }
 }
 
-/// A sheet thins out towards its rim: thickness falls to nothing over about this distance, px.
-pub(super) fn thin_rim(absorbance: &mut Tile, coverage: &Tile, reach_px: f64) {
-    let radius = random::count(reach_px);
+/// Thins a sheet towards its rim: thickness decreases to 0 over about this distance, px.
+pub(super) fn thin_rim(absorbance: &mut Tile, coverage: &Tile, distance_px: f64) {
+    let radius = random::count(distance_px);
     if radius == 0 {
         return;
     }
-    // Along a straight rim the mean of the cover over a box is a half at the rim and 1 a radius inside it.
+    // At a straight rim the mean coverage over a box is 0.5, and 1 at one radius inside.
     let width = coverage.width;
     let mut across = vec![0.0; coverage.values.len()];
     sums_across(&coverage.values, width, radius, &mut across);
@@ -191,8 +192,9 @@ fn thin(values: &mut [f32], sums: &[f32], weight: f32) {
     }
 }
 
-/// Sums over so many values to either side within rows, those beyond the ends 0. Several rows at a time, since each
-/// running sum has to wait for itself.
+/// Computes running sums within rows, over `radius` values to either side; values beyond the ends are 0.
+///
+/// Processes several rows at a time, because each running sum is a chain of dependent additions.
 fn sums_across(values: &[f32], width: usize, radius: usize, out: &mut [f32]) {
     const ROWS: usize = 8;
     let (blocks, out_blocks) = (values.chunks(ROWS * width), out.chunks_mut(ROWS * width));
@@ -213,48 +215,48 @@ fn sums_across(values: &[f32], width: usize, radius: usize, out: &mut [f32]) {
     }
 }
 
-/// How far from the nucleus the sheet is lifted by it, relative to its radius.
+/// Radius of the region where the nucleus lifts the sheet, relative to the nucleus radius.
 const LIFTED: f64 = 2.4;
 
-/// How much thicker it is there, relative to the density of the endoplasm: fitted by eye to how the cytoplasm round real nuclei falls off.
+/// Increase of thickness there, relative to the density of the endoplasm: matched by eye to real cells.
 const LIFT: f32 = 2.2;
 
-/// Steps from none to all of what changes towards the middle of a cell.
+/// Steps of a radial ramp.
 const STEPS: usize = 6;
 
-/// How far inside a polygon the places of a tile lie: 1 within `inner` times its size about `centre`, 0 outside `outer` times, and even
-/// steps between.
+/// Returns a ramp: 1 inside a polygon scaled by `inner` about `centre`, 0 outside the polygon scaled by `outer`, with
+/// equal steps between.
 fn ramp(like: &Tile, polygon: &[Point], centre: Point, inner: f64, outer: f64) -> Tile {
     let scaled = |step: usize| {
-        let share = inner + (outer - inner) * (step as f64 + 0.5) / STEPS as f64;
-        grown(polygon, centre, share)
+        let factor = inner + (outer - inner) * (step as f64 + 0.5) / STEPS as f64;
+        scaled_about(polygon, centre, factor)
     };
-    let mut shares = like.blank();
-    shares.add_covers((0..STEPS).map(scaled), 1.0 / STEPS as f32);
-    shares
+    let mut ramp = like.blank();
+    ramp.add_covers((0..STEPS).map(scaled), 1.0 / STEPS as f32);
+    ramp
 }
 
-/// The granular inner part of the cytoplasm round the nucleus, denser than the clear outer part.
-pub(super) fn add_endoplasm(absorbance: &mut Tile, outline: &[Point], nucleus: Point, cell: &Cell<'_>) {
-    let Cell { body, pools, .. } = *cell;
+/// Adds the endoplasm: the granular inner part of the cytoplasm, denser than the outer part.
+pub(super) fn add_endoplasm(absorbance: &mut Tile, outline: &[Point], nucleus: Point, cell: &CellContext<'_>) {
+    let CellContext { body, noise_fields, .. } = *cell;
     if body.detail.endoplasm <= 0.0 {
         return;
     }
     let (pixel_um, rng) = (cell.pixel_um(), &mut cell.stream("endoplasm"));
-    let share = random::between(0.45, 0.75, rng);
+    let size = random::between(0.45, 0.75, rng);
     let softness = random::between(0.08, 0.3, rng);
-    let zone = ramp(absorbance, outline, nucleus, share - softness, share + softness);
+    let zone = ramp(absorbance, outline, nucleus, size - softness, size + softness);
     // Densest where the nucleus lifts the sheet.
     let radius = body.nucleus.radius_um / pixel_um;
-    let round = wobbled_circle(radius, 0.15, 0.15, rng);
+    let round = perturbed_circle(radius, 0.15, 0.15, rng);
     let round: Vec<Point> = round.iter().map(|p| [p[0] + nucleus[0], p[1] + nucleus[1]]).collect();
-    let near = Tile::around(&grown(&round, nucleus, LIFTED), 1.0);
+    let near = Tile::around(&scaled_about(&round, nucleus, LIFTED), 1.0);
     let lifted = ramp(&near, &round, nucleus, 1.0, LIFTED);
     let lift = LIFT * body.detail.endoplasm as f32;
-    absorbance.meet(&lifted, |values, shares| {
-        values.iter_mut().zip(shares).for_each(|(value, share)| *value *= 1.0 + lift * share);
+    absorbance.blend(&lifted, |values, ramp| {
+        values.iter_mut().zip(ramp).for_each(|(value, ramp)| *value *= 1.0 + lift * ramp);
     });
-    let grain = Look::fine(pixel_um, rng);
+    let grain = FieldSampler::fine(pixel_um, rng);
     let density = body.detail.endoplasm as f32;
     let width = absorbance.width;
     let mut field = vec![0.0_f32; width];
@@ -263,27 +265,27 @@ pub(super) fn add_endoplasm(absorbance: &mut Tile, outline: &[Point], nucleus: P
     for (y, (row, zone)) in rows.enumerate() {
         let Some((first, end)) = covered(zone) else { continue };
         let field = &mut field[..end - first];
-        pools.grain().row_into(field, &grain, [first as f64, y as f64], &mut texels);
-        for ((value, share), noise) in row[first..end].iter_mut().zip(&zone[first..end]).zip(field) {
-            *value *= 1.0 + share * (density + density * noise.max(0.0));
+        noise_fields.grain().row_into(field, &grain, [first as f64, y as f64], &mut texels);
+        for ((value, inside), noise) in row[first..end].iter_mut().zip(&zone[first..end]).zip(field) {
+            *value *= 1.0 + inside * (density + density * noise.max(0.0));
         }
     }
 }
 
-/// The cleared space round the nucleus of a koilocyte, and the condensed cytoplasm at its edge.
-pub(super) fn add_halo(absorbance: &mut Tile, nucleus: Point, cell: &Cell<'_>) {
-    /// How far the condensed rim reaches, relative to the cleared space.
+/// Applies the halo of a koilocyte: the cleared space around the nucleus and the condensed cytoplasm at its edge.
+pub(super) fn add_halo(absorbance: &mut Tile, nucleus: Point, cell: &CellContext<'_>) {
+    /// Outer radius of the condensed rim, relative to the cleared space.
     const RIM: f64 = 1.35;
     let Some(halo) = cell.body.halo else { return };
-    let edge = wobbled_circle(halo.radius_um / cell.pixel_um(), 0.12, 0.10, &mut cell.stream("halo"));
+    let edge = perturbed_circle(halo.radius_um / cell.pixel_um(), 0.12, 0.10, &mut cell.stream("halo"));
     let edge: Vec<Point> = edge.iter().map(|p| [nucleus[0] + 1.15 * p[0], nucleus[1] + 0.87 * p[1]]).collect();
-    let near = Tile::around(&grown(&edge, nucleus, RIM), 1.0);
+    let near = Tile::around(&scaled_about(&edge, nucleus, RIM), 1.0);
     let clear = ramp(&near, &edge, nucleus, 0.88, 1.0);
     let mut factor = ramp(&near, &edge, nucleus, 1.0, RIM);
     for (factor, clear) in factor.values.iter_mut().zip(&clear.values) {
         *factor = (1.0 + halo.rim as f32 * (*factor - clear)) * (1.0 - halo.clearing as f32 * clear);
     }
-    absorbance.meet(&factor, |values, factors| {
+    absorbance.blend(&factor, |values, factors| {
         values.iter_mut().zip(factors).for_each(|(value, factor)| *value *= factor);
     });
 }
@@ -294,7 +296,7 @@ mod tests {
     use crate::phantom::tile::tests::{at, disc};
 
     #[test]
-    fn a_rim_thins_by_the_mean_of_the_cover_around() {
+    fn thin_rim_matches_the_local_mean_of_the_coverage() {
         let mut cover = Tile { origin: [3, -7], width: 31, values: vec![0.0; 31 * 27] };
         cover.cover(&disc([17.0, 5.0], 11.0));
         let radius = 4_i64;
@@ -304,20 +306,20 @@ mod tests {
             let [x, y] = p.map(|at| at as i64);
             let around = (y - radius..=y + radius).flat_map(|y| (x - radius..=x + radius).map(move |x| [x, y]));
             let sum: f64 = around.map(|p| f64::from(at(&cover, p))).sum();
-            let share = (2.0 * sum / 81.0 - 1.0).clamp(0.0, 1.0);
-            assert!((f64::from(*found) - share * (2.0 - share)).abs() < 1e-5, "{x} {y}: {found}");
+            let inside = (2.0 * sum / 81.0 - 1.0).clamp(0.0, 1.0);
+            assert!((f64::from(*found) - inside * (2.0 - inside)).abs() < 1e-5, "{x} {y}: {found}");
         });
     }
 
     #[test]
-    fn a_ramp_is_the_mean_of_nested_covers() {
+    fn a_ramp_is_the_mean_of_scaled_coverages() {
         let like = Tile { origin: [-20, -20], width: 41, values: vec![0.0; 41 * 41] };
         let (polygon, centre) = (disc([1.0, 0.5], 12.0), [0.0, 0.0]);
         let ramp = ramp(&like, &polygon, centre, 0.6, 1.4);
         let mut mean = like.blank();
         for step in 0..STEPS {
             let mut cover = like.blank();
-            cover.cover(&grown(&polygon, centre, 0.6 + 0.8 * (step as f64 + 0.5) / STEPS as f64));
+            cover.cover(&scaled_about(&polygon, centre, 0.6 + 0.8 * (step as f64 + 0.5) / STEPS as f64));
             mean.values.iter_mut().zip(&cover.values).for_each(|(mean, share)| *mean += share / STEPS as f32);
         }
         for (a, b) in ramp.values.iter().zip(&mean.values) {
@@ -327,14 +329,14 @@ mod tests {
     }
 
     #[test]
-    fn a_slant_leaves_the_middle_as_it_is() {
+    fn a_gradient_keeps_the_thickness_at_the_centre() {
         let mut tile = Tile { origin: [-30, 10], width: 61, values: vec![2.0; 61 * 41] };
-        slant(&mut tile, [0.0, 30.0], 25.0, [0.5, -0.25]);
+        apply_gradient(&mut tile, [0.0, 30.0], 25.0, [0.5, -0.25]);
         let at = |x: usize, y: usize| f64::from(tile.values[y * 61 + x]);
         assert!((at(30, 20) - 2.0).abs() < 1e-6);
         assert!((at(40, 30) - 2.0 * (1.0 + (5.0 - 2.5) / 25.0)).abs() < 1e-5, "{}", at(40, 30));
         let mut steep = Tile { origin: [-30, 10], width: 61, values: vec![1.0; 61 * 41] };
-        slant(&mut steep, [0.0, 30.0], 1.0, [0.5, 0.0]);
+        apply_gradient(&mut steep, [0.0, 30.0], 1.0, [0.5, 0.0]);
         assert!(steep.values.iter().all(|v| (0.35..=1.8).contains(v)));
     }
 }

@@ -8,57 +8,57 @@ mod wrinkles;
 
 use crate::error::Cause;
 use crate::key::Stream;
+use crate::phantom::assets::{ClassAssets, PhantomAssets};
+use crate::phantom::cell_context::CellContext;
 use crate::phantom::chromatin::interpolate;
-use crate::phantom::making::Cell;
 use crate::phantom::nucleus;
-use crate::phantom::piece::{LEAST_ABSORBANCE, Phantom, Piece};
-use crate::phantom::studio::{ClassStudio, Studio};
+use crate::phantom::piece::{MIN_ABSORBANCE, Phantom, Piece};
 use crate::phantom::tile::{Point, Tile, area};
 use crate::profile::Stage;
 use crate::scene::cell::{CellBody, Fold, FoldForm};
 use crate::truth::part::Part;
 use crate::truth::traits::Trait;
 
-/// Points of a cell's outline before its rim is roughened.
+/// Points of a cell outline before its rim is roughened.
 const POINTS: usize = 180;
 
-/// Largest angle between the two creases of a cell that is folded from both sides, radians.
+/// Largest angle between the two creases of a cell folded from both sides, radians.
 const SKEW: f64 = 0.45;
 
 /// Distance between the points of a roughened rim, µm.
 const RIM_STEP_UM: f64 = 0.375;
 
-/// Makes cells, sixteen sheets at a time.
-pub(super) fn make(studio: &Studio, cells: &[Cell<'_>]) -> Result<Vec<Phantom>, Cause> {
-    let plans = cells.iter().map(Plan::new).collect::<Result<Vec<_>, _>>()?;
-    let sheets = studio.watch.time(Stage::Sheets, || crumple(studio, cells, &plans))?;
-    let finished = |((cell, plan), sheet): ((&Cell<'_>, Plan), Option<Sheet>)| finish(cell, plan, sheet);
-    studio.watch.time(Stage::Cytoplasm, || cells.iter().zip(plans).zip(sheets).map(finished).collect())
+/// Draws cells; sheets are simulated in batches.
+pub(super) fn make(assets: &PhantomAssets, cells: &[CellContext<'_>]) -> Result<Vec<Phantom>, Cause> {
+    let plans = cells.iter().map(CellPlan::new).collect::<Result<Vec<_>, _>>()?;
+    let sheets = assets.timer.time(Stage::Sheets, || crumple(assets, cells, &plans))?;
+    let finished = |((cell, plan), sheet): ((&CellContext<'_>, CellPlan), Option<Sheet>)| finish(cell, plan, sheet);
+    assets.timer.time(Stage::Cytoplasm, || cells.iter().zip(plans).zip(sheets).map(finished).collect())
 }
 
-/// A cell before it has a sheet.
-struct Plan<'a> {
-    class: &'a ClassStudio,
+/// A cell before the simulation of its sheet.
+struct CellPlan<'a> {
+    class: &'a ClassAssets,
     centre: Point,
     outline: Vec<Point>,
     nucleus: Piece,
     creases: Vec<Crease>,
 }
 
-impl<'a> Plan<'a> {
-    fn new(cell: &Cell<'a>) -> Result<Self, Cause> {
-        let Cell { studio, scene, object, body, .. } = *cell;
-        let class = studio.classes.get(&body.class).ok_or_else(|| Cause::ForeignClass(body.class.clone()))?;
+impl<'a> CellPlan<'a> {
+    fn new(cell: &CellContext<'a>) -> Result<Self, Cause> {
+        let CellContext { assets, scene, object, body, .. } = *cell;
+        let class = assets.classes.get(&body.class).ok_or_else(|| Cause::ForeignClass(body.class.clone()))?;
         let centre = scene.sheet_grid().to_px(object.centre_um);
-        let outline = studio.watch.time(Stage::Outlines, || outline(cell, class, centre))?;
-        let nucleus = studio.watch.time(Stage::Nuclei, || nucleus::make(cell, class))?;
+        let outline = assets.timer.time(Stage::Outlines, || outline(cell, class, centre))?;
+        let nucleus = assets.timer.time(Stage::Nuclei, || nucleus::make(cell, class))?;
         let creases = body.fold.map_or(Vec::new(), |fold| creases(cell, fold, &outline, centre));
         Ok(Self { class, centre, outline, nucleus, creases })
     }
 }
 
-/// The outline of a cell before its rim is roughened.
-fn outline(cell: &Cell<'_>, class: &ClassStudio, centre: Point) -> Result<Vec<Point>, Cause> {
+/// Draws the outline of a cell before its rim is roughened.
+fn outline(cell: &CellContext<'_>, class: &ClassAssets, centre: Point) -> Result<Vec<Point>, Cause> {
     let mut rng = cell.stream("outline");
     let radius_px = cell.body.radius_um / cell.pixel_um();
     let formed = class.cytoplasm(radius_px, &mut rng)?;
@@ -70,58 +70,59 @@ fn outline(cell: &Cell<'_>, class: &ClassStudio, centre: Point) -> Result<Vec<Po
     Ok(outline::shaped(outline, &cell.body.detail, &mut cell.stream("outline.corners")))
 }
 
-/// The lines along which a cell is folded, each with its side turned in.
-fn creases(cell: &Cell<'_>, fold: Fold, outline: &[Point], centre: Point) -> Vec<Crease> {
+/// Returns the creases along which a cell is folded.
+fn creases(cell: &CellContext<'_>, fold: Fold, outline: &[Point], centre: Point) -> Vec<Crease> {
     let radius = (area(outline) / core::f64::consts::PI).sqrt();
     let (body, pixel_um) = (cell.body, cell.pixel_um());
-    let off_centre = body.nucleus.off_centre.map(|share| share * body.radius_um / pixel_um);
+    let off_centre = body.nucleus.off_centre.map(|fraction| fraction * body.radius_um / pixel_um);
     let nucleus_radius = body.nucleus.radius_um / pixel_um;
     let crease = |direction: f64| {
         let normal = [libm::cos(direction), libm::sin(direction)];
         let reach =
             outline.iter().map(|p| (p[0] - centre[0]) * normal[0] + (p[1] - centre[1]) * normal[1]).fold(0.0, f64::max);
-        // The crease passes clear of the nucleus, which is too stiff to fold.
+        // The nucleus is too stiff to fold, so the crease keeps a distance from it.
         let nucleus_at = off_centre[0] * normal[0] + off_centre[1] * normal[1];
         let at = (reach - fold.depth * radius).max(nucleus_at + 1.3 * nucleus_radius);
         let kind = match fold.form {
-            FoldForm::Flap | FoldForm::Cigar => FoldKind::Flap,
+            FoldForm::Flap | FoldForm::FoldedOver => FoldKind::Flap,
             FoldForm::Roll => FoldKind::Roll { turns: 1 },
         };
         Crease {
             point: [centre[0] + at * normal[0], centre[1] + at * normal[1]],
-            // The line runs a quarter turn before the direction that leads beyond it.
+            // The crease is perpendicular to the direction of the fold.
             direction_rad: direction - core::f64::consts::FRAC_PI_2,
             radius: fold.radius_um / pixel_um,
             kind,
         }
     };
-    // Away from the nucleus there is more to fold.
+    // Folds on the side away from the nucleus, which has more room.
     let mut direction = fold.direction_deg.to_radians();
     if off_centre[0] * libm::cos(direction) + off_centre[1] * libm::sin(direction) > 0.0 {
         direction += core::f64::consts::PI;
     }
     match fold.form {
-        // The second side is never turned in quite parallel to the first.
-        FoldForm::Cigar => {
+        // The two creases are not exactly parallel.
+        FoldForm::FoldedOver => {
             vec![crease(direction), crease(direction + core::f64::consts::PI + SKEW * libm::sin(7.0 * direction))]
         }
         FoldForm::Flap | FoldForm::Roll => vec![crease(direction)],
     }
 }
 
-fn crumple(studio: &Studio, cells: &[Cell<'_>], plans: &[Plan]) -> Result<Vec<Option<Sheet>>, Cause> {
-    let Some(cloth) = &studio.cloth else { return Ok(plans.iter().map(|_| None).collect()) };
+fn crumple(assets: &PhantomAssets, cells: &[CellContext<'_>], plans: &[CellPlan]) -> Result<Vec<Option<Sheet>>, Cause> {
+    let Some(cloth) = &assets.cloth else { return Ok(plans.iter().map(|_| None).collect()) };
     let jobs = cells.iter().zip(plans);
-    let jobs = jobs.map(|(cell, plan)| SheetSpec { outline: &plan.outline, area_ratio: cell.body.detail.excess });
+    let jobs = jobs.map(|(cell, plan)| SheetSpec { outline: &plan.outline, area_ratio: cell.body.detail.excess_area });
     let mut streams: Vec<Stream> = cells.iter().map(|cell| cell.stream("sheet")).collect();
     let sheets = cloth.crumple_each(&jobs.collect::<Vec<_>>(), &mut streams);
     sheets.into_iter().map(|sheet| Ok(Some(sheet?))).collect()
 }
 
-/// Presses, folds and stains a cell. Its absorbance is that of a dye along the light's path (Eq. 12): A = κ·c·l, where
-/// l is the sheet's thickness and κ·c the cell's stain.
-fn finish(cell: &Cell<'_>, plan: Plan, sheet: Option<Sheet>) -> Result<Phantom, Cause> {
-    let Cell { scene, body, .. } = *cell;
+/// Folds the sheet of a cell and computes its absorbance along the light path (Eq. 12): A = κ·c·l.
+///
+/// l is the thickness of the sheet and κ·c the absorbance of the cytoplasm.
+fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Result<Phantom, Cause> {
+    let CellContext { scene, body, .. } = *cell;
     let mut rng = cell.stream("detail");
     let pixel_um = cell.pixel_um();
     let mut pieces = vec![plan.outline.clone()];
@@ -152,7 +153,7 @@ fn finish(cell: &Cell<'_>, plan: Plan, sheet: Option<Sheet>) -> Result<Phantom, 
         }
         None => flat(&mut absorbance, &coverage, profile, plan.centre, body.radius_um / pixel_um),
     }
-    detail::slant(&mut absorbance, plan.centre, body.radius_um / pixel_um, body.detail.wedge);
+    detail::apply_gradient(&mut absorbance, plan.centre, body.radius_um / pixel_um, body.detail.thickness_gradient);
     detail::thin_rim(&mut absorbance, &coverage, body.detail.rim_um / pixel_um);
     let nucleus = [0, 1].map(|axis| plan.centre[axis] + body.nucleus.off_centre[axis] * body.radius_um / pixel_um);
     wrinkles::add(&mut absorbance, &coverage, &plan.outline, cell);
@@ -162,14 +163,14 @@ fn finish(cell: &Cell<'_>, plan: Plan, sheet: Option<Sheet>) -> Result<Phantom, 
     detail::add_cytoskeleton(&mut absorbance, &plan.outline, cell, &mut rng)?;
     detail::add_granules(&mut absorbance, &coverage, body.detail.granules, pixel_um, &mut rng);
     // Eq. 12: A = κ·c·l.
-    let strength = body.cytoplasm_absorbance.max(LEAST_ABSORBANCE) as f32;
+    let strength = body.cytoplasm_absorbance.max(MIN_ABSORBANCE) as f32;
     absorbance.values.iter_mut().zip(&coverage.values).for_each(|(value, cover)| *value *= cover * strength);
     let step = scene.grid().width / scene.sheet_grid().width;
     let area_px = coverage.sum() * (step * step) as f64;
     let absorbance = absorbance.refined(step);
-    let phase_rad = body.phase_rad / body.cytoplasm_absorbance.max(LEAST_ABSORBANCE);
+    let phase_rad = body.phase_rad / body.cytoplasm_absorbance.max(MIN_ABSORBANCE);
     let whole = Piece::whole(absorbance, coverage, area_px, body.dyes);
-    let cytoplasm = Piece { part: Part::Cytoplasm, cover_step: step, phase_rad, ..whole };
+    let cytoplasm = Piece { part: Part::Cytoplasm, coverage_step: step, phase_rad, ..whole };
     Ok(Phantom { pieces: vec![cytoplasm, plan.nucleus], traits: traits(body) })
 }
 
@@ -177,7 +178,7 @@ fn traits(body: &CellBody) -> Vec<Trait> {
     let fold = body.fold.map(|fold| match fold.form {
         FoldForm::Flap => Trait::Flap,
         FoldForm::Roll => Trait::Rolled,
-        FoldForm::Cigar => Trait::Folded,
+        FoldForm::FoldedOver => Trait::Folded,
     });
     let koilocytic = body.halo.map(|_| Trait::Koilocytic);
     let granular = (body.detail.granules > 0.0).then_some(Trait::Granular);
@@ -186,7 +187,7 @@ fn traits(body: &CellBody) -> Vec<Trait> {
     [fold, koilocytic, granular, pyknotic, wrinkled].into_iter().flatten().collect()
 }
 
-/// A sheet without folds: thick in the middle, thin at the rim.
+/// Computes the thickness of a sheet without folds from its profile from rim to centre.
 fn flat(absorbance: &mut Tile, coverage: &Tile, profile: &[f64], centre: Point, radius: f64) {
     let cover = &coverage.values;
     let mut index = 0;

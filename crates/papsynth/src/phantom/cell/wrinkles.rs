@@ -1,4 +1,4 @@
-//! Wrinkles: narrow creases in which a sheet lies doubled, some along its rim, some across it, some forked.
+//! Wrinkles: narrow creases of doubled cytoplasm, along the rim, across the cell, or forked.
 
 use core::ops::Range;
 
@@ -6,25 +6,28 @@ use multiversion::multiversion;
 use portable_numerics::elementary::exp_f32;
 
 use crate::key::Stream;
-use crate::phantom::making::Cell;
+use crate::phantom::cell_context::CellContext;
 use crate::phantom::tile::{Point, Tile};
 use crate::random;
 
-/// Distance of the points of a wrinkle, µm.
+/// Distance between the points of a wrinkle, µm.
 const STEP_UM: f64 = 0.5;
 
-/// Share of wrinkles that follow the rim, and of the others that fork off one drawn before.
+/// Fraction of wrinkles that follow the rim.
 const ALONG_RIM: f64 = 0.5;
+/// Fraction of the other wrinkles that fork off a previous one.
 const FORKED: f64 = 0.35;
 
-/// Share of a wrinkle's length over which it rises and dies away.
+/// Fraction of a wrinkle's length over which it rises or fades.
 const TAPER: f64 = 0.3;
 
-/// What of a wrinkle's strength lies in the slope beside it, and how many times as wide as the wrinkle that is.
+/// Height of the slope next to a wrinkle, relative to its crest.
 const SLOPE: f64 = 0.30;
+/// Width of the slope, relative to the wrinkle.
 const SLOPE_WIDTH: f64 = 4.0;
 
-pub(super) fn add(thickness: &mut Tile, coverage: &Tile, outline: &[Point], cell: &Cell<'_>) {
+/// Adds the wrinkles of a cell to its thickness.
+pub(super) fn add(thickness: &mut Tile, coverage: &Tile, outline: &[Point], cell: &CellContext<'_>) {
     let (detail, pixel_um, rng) = (&cell.body.detail, cell.pixel_um(), &mut cell.stream("wrinkles"));
     let step = STEP_UM / pixel_um;
     let steps_round = || random::count(fsd_shape::perimeter(outline) / step).max(8);
@@ -40,71 +43,71 @@ pub(super) fn add(thickness: &mut Tile, coverage: &Tile, outline: &[Point], cell
             }
             _ => across(outline, step, rng),
         };
-        let brush = Brush {
+        let profile = WrinkleProfile {
             width: detail.wrinkle_um * random::between(0.6, 1.6, rng) / pixel_um,
-            strength: detail.wrinkle * random::between(0.4, 1.6, rng),
+            strength: detail.wrinkle_thickness * random::between(0.4, 1.6, rng),
             side: if random::chance(0.5, rng) { 1.0 } else { -1.0 },
             rise: random::between(0.05, TAPER, rng),
             fall: random::between(0.1, 2.0 * TAPER, rng),
-            uneven: uneven(path.len(), rng),
+            factors: random_factors(path.len(), rng),
         };
-        brush.draw(&path, thickness, coverage, &mut canvas);
+        profile.draw(&path, thickness, coverage, &mut canvas);
         drawn.push(path);
     }
 }
 
-/// Random factors of mean 1 or so that change over a few micrometres, some of them 0.
-fn uneven(count: usize, rng: &mut Stream) -> Vec<f64> {
-    let mut walk = Walk::new(0.45, rng);
-    (0..count).map(|_| (0.9 + walk.next(rng)).clamp(0.0, 2.5)).collect()
+/// Draws random factors with a mean of about 1 and a correlation length of a few micrometres; some are 0.
+fn random_factors(count: usize, rng: &mut Stream) -> Vec<f64> {
+    let mut noise = Autoregression::new(0.45, rng);
+    (0..count).map(|_| (0.9 + noise.next(rng)).clamp(0.0, 2.5)).collect()
 }
 
-/// A stretch of the rim, moved inwards. `fine` is the outline step by step.
+/// Draws a path along the rim, moved inwards. `fine` is the outline at equal steps.
 fn along_rim(outline: &[Point], fine: &[Point], rng: &mut Stream) -> Vec<Point> {
     let middle = fsd_shape::centroid(outline);
     let length = random::count(fine.len() as f64 * random::between(0.06, 0.35, rng)).max(4);
     let first = random::below(fine.len(), rng);
-    // Most lie near the rim: it is there that a thin sheet is free to fold.
+    // Most wrinkles are near the rim, where a thin sheet folds freely.
     let depth = random::uniform(rng);
     let inset = 0.015 + 0.35 * depth * depth;
     let drift = random::between(-0.3, 0.3, rng);
-    let mut walk = Walk::new(0.022, rng);
+    let mut noise = Autoregression::new(0.022, rng);
     (0..length)
         .map(|i| {
             let p = fine[(first + i) % fine.len()];
             let t = i as f64 / length as f64;
-            let shrink = 1.0 - (inset + drift * (t - 0.5) + walk.next(rng)).max(0.008);
+            let shrink = 1.0 - (inset + drift * (t - 0.5) + noise.next(rng)).max(0.008);
             [middle[0] + shrink * (p[0] - middle[0]), middle[1] + shrink * (p[1] - middle[1])]
         })
         .collect()
 }
 
-/// A bent line that starts anywhere.
+/// Draws a curved path from a random point.
 fn across(outline: &[Point], step: f64, rng: &mut Stream) -> Vec<Point> {
     let middle = fsd_shape::centroid(outline);
     let rim = outline[random::below(outline.len(), rng)];
-    let share = 0.2 + 0.75 * random::uniform(rng).sqrt();
-    let start = [middle[0] + share * (rim[0] - middle[0]), middle[1] + share * (rim[1] - middle[1])];
-    wander(start, random::direction(rng), radius_of(outline), step, rng)
+    let t = 0.2 + 0.75 * random::uniform(rng).sqrt();
+    let start = [middle[0] + t * (rim[0] - middle[0]), middle[1] + t * (rim[1] - middle[1])];
+    curved_path(start, random::direction(rng), radius_of(outline), step, rng)
 }
 
-/// A line that leaves another one at an acute angle.
+/// Draws a curved path that leaves another one at an acute angle.
 fn forked(stem: &[Point], outline: &[Point], step: f64, rng: &mut Stream) -> Vec<Point> {
     let at = random::below(stem.len().saturating_sub(1), rng);
     let (a, b) = (stem[at], stem[(at + 1).min(stem.len() - 1)]);
     let turn = random::between(0.25, 0.9, rng) * if random::chance(0.5, rng) { 1.0 } else { -1.0 };
-    wander(a, libm::atan2(b[1] - a[1], b[0] - a[0]) + turn, radius_of(outline), step, rng)
+    curved_path(a, libm::atan2(b[1] - a[1], b[0] - a[0]) + turn, radius_of(outline), step, rng)
 }
 
 fn radius_of(outline: &[Point]) -> f64 {
     (super::area(outline) / core::f64::consts::PI).sqrt()
 }
 
-/// A line of slowly changing curvature.
-fn wander(start: Point, direction: f64, radius: f64, step: f64, rng: &mut Stream) -> Vec<Point> {
+/// Draws a path of slowly changing curvature.
+fn curved_path(start: Point, direction: f64, radius: f64, step: f64, rng: &mut Stream) -> Vec<Point> {
     let steps = random::count(random::between(0.35, 1.5, rng) * radius / step).max(4);
     let mean = random::normal(rng) * 0.5 / radius;
-    let mut curvature = Walk::new(1.2 / radius, rng);
+    let mut curvature = Autoregression::new(1.2 / radius, rng);
     let (mut at, mut heading) = (start, direction);
     (0..steps)
         .map(|_| {
@@ -116,12 +119,12 @@ fn wander(start: Point, direction: f64, radius: f64, step: f64, rng: &mut Stream
 }
 
 /// A first-order autoregression.
-struct Walk {
+struct Autoregression {
     state: f64,
     sd: f64,
 }
 
-impl Walk {
+impl Autoregression {
     const MEMORY: f64 = 0.93;
 
     fn new(sd: f64, rng: &mut Stream) -> Self {
@@ -135,53 +138,54 @@ impl Walk {
     }
 }
 
-/// What draws a wrinkle: sharp on one side, sloping on the other.
-struct Brush {
-    /// Standard deviation of its crest, px.
+/// The cross-section of a wrinkle: sharp on one side, sloping on the other.
+struct WrinkleProfile {
+    /// Standard deviation of the crest, px.
     width: f64,
-    /// Thickness added at its crest, relative to the flat sheet's.
+    /// Thickness added at the crest, relative to a flat sheet.
     strength: f64,
     /// The side of the slope: 1 or −1.
     side: f64,
-    /// Shares of the length over which it rises and dies away.
+    /// Fraction of the length over which it rises.
     rise: f64,
+    /// Fraction of the length over which it fades.
     fall: f64,
-    /// Factor on its strength, step by step: wrinkles break off and begin again.
-    uneven: Vec<f64>,
+    /// Factor on the strength of each step: wrinkles are interrupted.
+    factors: Vec<f64>,
 }
 
-impl Brush {
-    /// Adds the wrinkle to what the cell covers. `canvas` is zero before and after.
+impl WrinkleProfile {
+    /// Adds the wrinkle where the cell covers. `canvas` is zero before and after.
     fn draw(&self, path: &[Point], thickness: &mut Tile, coverage: &Tile, canvas: &mut [f32]) {
         let (width, height) = (thickness.width, thickness.height());
         let origin = thickness.origin.map(|at| at as f64);
-        // Of each row the columns that it meets.
+        // Column range of the wrinkle in each row.
         let mut touched = vec![width..0; height];
-        for (index, (ends, uneven)) in path.windows(2).zip(&self.uneven).enumerate() {
+        for (index, (ends, factor)) in path.windows(2).zip(&self.factors).enumerate() {
             let ends = [ends[0], ends[1]].map(|p| [p[0] - origin[0], p[1] - origin[1]]);
             let t = (index as f64 + 0.5) / (path.len() - 1) as f64;
             let fade = (t / self.rise).min((1.0 - t) / self.fall).min(1.0);
-            let strength = self.strength * fade * (2.0 - fade) * uneven;
+            let strength = self.strength * fade * (2.0 - fade) * factor;
             if strength > 0.0 {
-                self.strip(ends, strength).paint(canvas, width, &mut touched);
+                self.segment(ends, strength).paint(canvas, width, &mut touched);
             }
         }
         for (y, columns) in touched.into_iter().enumerate().filter(|(_, columns)| !columns.is_empty()) {
             let row = y * width + columns.start..y * width + columns.end;
-            settle(&mut thickness.values[row.clone()], &coverage.values[row.clone()], &mut canvas[row]);
+            add_and_clear(&mut thickness.values[row.clone()], &coverage.values[row.clone()], &mut canvas[row]);
         }
     }
 
-    /// One step of the wrinkle, from one place of the tile to the next.
-    fn strip(&self, [a, b]: [Point; 2], strength: f64) -> Strip {
+    /// Returns one step of the wrinkle, between two points of the tile.
+    fn segment(&self, [a, b]: [Point; 2], strength: f64) -> Segment {
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
         let length = (dx * dx + dy * dy).sqrt().max(f64::MIN_POSITIVE);
         let along = [dx / length, dy / length];
-        Strip {
+        Segment {
             from: a,
             along,
             off: [-self.side * along[1], self.side * along[0]],
-            reach: [[-self.width, length + self.width], [-3.0 * self.width, 2.2 * SLOPE_WIDTH * self.width]],
+            range: [[-self.width, length + self.width], [-3.0 * self.width, 2.2 * SLOPE_WIDTH * self.width]],
             strength: strength as f32,
             crest: (-0.5 / (self.width * self.width)) as f32,
             slope: (-1.0 / (SLOPE_WIDTH * self.width)) as f32,
@@ -190,35 +194,36 @@ impl Brush {
 }
 
 /// A step of a wrinkle: a rectangle with a profile across it.
-struct Strip {
+struct Segment {
     from: Point,
-    /// Unit vectors: where it leads, and to the side of its slope.
+    /// Unit vector along the wrinkle.
     along: Point,
+    /// Unit vector towards the slope.
     off: Point,
-    /// How far it reaches in these two directions, px.
-    reach: [[f64; 2]; 2],
+    /// Range in these two directions, px.
+    range: [[f64; 2]; 2],
     strength: f32,
     /// −1/(2σ²) of the crest and −1/λ of the slope, px⁻² and px⁻¹.
     crest: f32,
     slope: f32,
 }
 
-impl Strip {
-    /// The rows of an image so high that it meets.
+impl Segment {
+    /// Returns the rows of the image that it intersects.
     fn rows(&self, height: usize) -> Range<usize> {
         let corner = |along: usize, off: usize| {
-            self.from[1] + self.reach[0][along] * self.along[1] + self.reach[1][off] * self.off[1]
+            self.from[1] + self.range[0][along] * self.along[1] + self.range[1][off] * self.off[1]
         };
         let corners = [corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)];
         let (low, high) = corners.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(*y), b.max(*y)));
-        whole(low, high, height)
+        integers(low, high, height)
     }
 
-    /// The columns of a row that lie in it.
+    /// Returns the columns of a row inside it.
     fn columns(&self, y: usize, width: usize) -> Range<usize> {
         let (mut low, mut high) = (0.0_f64, width as f64);
-        for (direction, [least, most]) in [self.along, self.off].into_iter().zip(self.reach) {
-            // How far along the direction column 0 lies, and how much further each column leads.
+        for (direction, [least, most]) in [self.along, self.off].into_iter().zip(self.range) {
+            // Coordinate of column 0 along the direction; each column adds direction[0].
             let at = (y as f64 - self.from[1]) * direction[1] - self.from[0] * direction[0];
             if direction[0].abs() > 1e-9 {
                 let [a, b] = [(least - at) / direction[0], (most - at) / direction[0]];
@@ -227,10 +232,10 @@ impl Strip {
                 return 0..0;
             }
         }
-        whole(low, high, width)
+        integers(low, high, width)
     }
 
-    /// Raises pixels to the profile across it, and adds their columns to those that were touched of each row.
+    /// Raises pixels to the profile and extends the touched column range of each row.
     fn paint(&self, canvas: &mut [f32], width: usize, touched: &mut [Range<usize>]) {
         for y in self.rows(touched.len()) {
             let columns = self.columns(y, width);
@@ -240,29 +245,31 @@ impl Strip {
             touched[y] = touched[y].start.min(columns.start)..touched[y].end.max(columns.end);
             let first = (columns.start as f64 - self.from[0]) * self.off[0] + (y as f64 - self.from[1]) * self.off[1];
             let row = &mut canvas[y * width..][columns];
-            raise(row, [first as f32, self.off[0] as f32], [self.crest, self.slope], self.strength);
+            raise_to_profile(row, [first as f32, self.off[0] as f32], [self.crest, self.slope], self.strength);
         }
     }
 }
 
-/// The whole numbers between two others, of those below a count.
-fn whole(low: f64, high: f64, count: usize) -> Range<usize> {
+/// Returns the integers between two numbers, limited to `0..count`.
+fn integers(low: f64, high: f64, count: usize) -> Range<usize> {
     let clamped = |value: f64| value.clamp(0.0, count as f64) as usize;
     clamped(low.ceil())..clamped(high.floor() + 1.0)
 }
 
-/// Adds what was painted to what is covered, and clears it.
+/// Adds painted values where the cell covers, and clears them.
 #[multiversion(targets = "simd")]
-fn settle(thickness: &mut [f32], cover: &[f32], painted: &mut [f32]) {
+fn add_and_clear(thickness: &mut [f32], cover: &[f32], painted: &mut [f32]) {
     for ((value, cover), added) in thickness.iter_mut().zip(cover).zip(painted) {
         *value += if *cover > 0.0 { *added } else { 0.0 };
         *added = 0.0;
     }
 }
 
-/// Raises a row to a profile, whose distances from the crest are `first + i·step`: a Gaussian crest, and a slope on the positive side.
+/// Raises a row to a profile: a Gaussian crest with a slope on the positive side.
+///
+/// Value i has the distance `first + i·step` from the crest.
 #[multiversion(targets = "simd")]
-fn raise(row: &mut [f32], [first, step]: [f32; 2], [crest, slope]: [f32; 2], strength: f32) {
+fn raise_to_profile(row: &mut [f32], [first, step]: [f32; 2], [crest, slope]: [f32; 2], strength: f32) {
     for (i, value) in row.iter_mut().enumerate() {
         let off = first + step * i as f32;
         let gauss = exp_f32(crest * off * off);
@@ -277,16 +284,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_step_is_painted_as_its_profile_says() {
+    fn a_segment_matches_its_profile() {
         let (width, height) = (90, 70);
         for (side, direction) in [(1.0, 0.3), (-1.0, 2.0), (1.0, 0.0), (-1.0, -core::f64::consts::FRAC_PI_2)] {
-            let brush = Brush { width: 2.3, strength: 0.0, side, rise: 0.0, fall: 0.0, uneven: Vec::new() };
+            let profile = WrinkleProfile { width: 2.3, strength: 0.0, side, rise: 0.0, fall: 0.0, factors: Vec::new() };
             let along = [libm::cos(direction), libm::sin(direction)];
             let [a, length] = [[40.3, 33.8], [7.0, 7.0]];
-            let strip = brush.strip([a, [a[0] + length[0] * along[0], a[1] + length[1] * along[1]]], 0.8);
+            let segment = profile.segment([a, [a[0] + length[0] * along[0], a[1] + length[1] * along[1]]], 0.8);
             let mut canvas = vec![0.0; width * height];
             let mut touched = vec![width..0; height];
-            strip.paint(&mut canvas, width, &mut touched);
+            segment.paint(&mut canvas, width, &mut touched);
             let mut painted = 0;
             for (index, value) in canvas.iter().enumerate() {
                 let p = [(index % width) as f64 - a[0], (index / width) as f64 - a[1]];
@@ -295,8 +302,8 @@ mod tests {
                 let inside = (-2.3..=9.3).contains(&on) && (-6.9..=20.24).contains(&off);
                 let gauss = libm::exp(-0.5 * off * off / (2.3 * 2.3));
                 let slope = if off > 0.0 { SLOPE * (libm::exp(-off / (SLOPE_WIDTH * 2.3)) - gauss) } else { 0.0 };
-                let wanted = if inside { 0.8 * (gauss + slope) } else { 0.0 };
-                assert!((f64::from(*value) - wanted).abs() < 1e-5, "{direction}: {p:?} {value} {wanted}");
+                let expected = if inside { 0.8 * (gauss + slope) } else { 0.0 };
+                assert!((f64::from(*value) - expected).abs() < 1e-5, "{direction}: {p:?} {value} {expected}");
                 painted += usize::from(inside);
                 assert!(!inside || touched[index / width].contains(&(index % width)), "{touched:?} {index}");
             }
@@ -305,16 +312,17 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_beyond_the_tile_is_left_out() {
-        let brush = Brush { width: 2.0, strength: 1.0, side: 1.0, rise: 0.1, fall: 0.1, uneven: vec![1.0; 40] };
+    fn parts_outside_the_tile_are_ignored() {
+        let profile =
+            WrinkleProfile { width: 2.0, strength: 1.0, side: 1.0, rise: 0.1, fall: 0.1, factors: vec![1.0; 40] };
         let path: Vec<Point> = (0..40).map(|i| [f64::from(i) - 15.0, 0.4 * f64::from(i) - 9.0]).collect();
         let tile = Tile { origin: [-5, -3], width: 12, values: vec![1.0; 12 * 9] };
         let (mut drawn, mut canvas) = (tile.clone(), vec![0.0; 12 * 9]);
-        brush.draw(&path, &mut drawn, &tile, &mut canvas);
+        profile.draw(&path, &mut drawn, &tile, &mut canvas);
         assert!(canvas.iter().all(|v| *v == 0.0));
         assert!(drawn.values.iter().any(|v| *v > 1.5) && drawn.values.iter().all(|v| (1.0..=2.0).contains(v)));
         let mut bare = tile.clone();
-        brush.draw(&path, &mut bare, &tile.blank(), &mut canvas);
+        profile.draw(&path, &mut bare, &tile.blank(), &mut canvas);
         assert_eq!(bare, tile);
     }
 }

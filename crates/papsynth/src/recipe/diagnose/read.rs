@@ -8,6 +8,7 @@ use toml::de::{DeTable, DeValue};
 use super::nearest::nearest;
 use super::schema::{Schema, Section, quoted};
 use crate::model::Model;
+use crate::recipe::abundance::{Abundance, PER_MM2};
 use crate::recipe::number::Number;
 use crate::recipe::whole::{RECIPE_VERSION, Recipe};
 
@@ -177,13 +178,19 @@ impl Check<'_> {
     /// A distribution is read by itself: in a section with a `kind`, the reader would only name the section.
     fn distribution(&mut self, node: &Node<'_>, section: Section<'_>, path: &[String]) {
         #[derive(serde::Deserialize)]
-        struct One {
+        struct One<T> {
             #[serde(rename = "x")]
-            _x: Number,
+            _x: T,
         }
         const BEFORE: &str = "x = ";
         let written = self.text.get(node.span()).unwrap_or_default();
-        let Err(error) = toml::from_str::<One>(&format!("{BEFORE}{written}")) else { return };
+        let text = format!("{BEFORE}{written}");
+        let result = if section.field(PER_MM2, None).is_some() {
+            toml::from_str::<One<Abundance>>(&text).map(|_| ())
+        } else {
+            toml::from_str::<One<Number>>(&text).map(|_| ())
+        };
+        let Err(error) = result else { return };
         let inner = error.span().filter(|span| span.start >= BEFORE.len()).map_or(node.span(), |span| {
             let start = node.span().start;
             start + span.start - BEFORE.len()..start + span.end - BEFORE.len()

@@ -2,6 +2,7 @@
 
 use serde_json::{Map, Value};
 
+use crate::recipe::abundance::PER_MM2;
 use crate::recipe::whole::Recipe;
 
 /// The schema of recipes.
@@ -154,7 +155,10 @@ impl<'s> Section<'s> {
     /// What would be accepted, in a few words.
     pub fn expected(self) -> String {
         let words = self.words();
-        if self.is_number() {
+        if self.field(PER_MM2, None).is_some() {
+            "a count, or a density such as { per_mm2 = 180 }; either may be a distribution such as { uniform = [1, 2] }"
+                .to_owned()
+        } else if self.is_number() {
             "a number, or a distribution such as { uniform = [1, 2] }".to_owned()
         } else if !words.is_empty() {
             format!("one of {}", quoted(words))

@@ -1,4 +1,4 @@
-//! Laws of the Gaussian blur, and slow oracles beside the fast paths.
+//! Tests of the Gaussian blur: invariants, and fast methods against slow references.
 
 use optics_psf::{Border, Error, Gaussian, Method, Scratch};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -26,7 +26,7 @@ fn transposed(image: &[f32], width: usize) -> Vec<f32> {
     (0..width).flat_map(|x| image.iter().skip(x).step_by(width).copied()).collect()
 }
 
-/// Two-dimensional convolution in double precision, one pixel after the other.
+/// Reference: two-dimensional convolution in double precision, one pixel at a time.
 fn oracle(image: &[f32], width: usize, border: Border, gaussian: &Gaussian) -> Vec<f64> {
     let (w, h) = (width.cast_signed(), (image.len() / width).cast_signed());
     let r = gaussian.radius().cast_signed();
@@ -44,7 +44,7 @@ fn oracle(image: &[f32], width: usize, border: Border, gaussian: &Gaussian) -> V
 }
 
 #[test]
-fn direct_is_the_convolution() {
+fn direct_matches_convolution() {
     for (width, height) in [(1, 1), (1, 9), (7, 1), (5, 4), (33, 20), (150, 9), (19, 70)] {
         let image = noise(width * height);
         for sigma in [0.05, 0.5, 0.9, 2.3] {
@@ -61,16 +61,16 @@ fn direct_is_the_convolution() {
 }
 
 #[test]
-fn in_focus_nothing_happens() {
+fn zero_sigma_is_the_identity() {
     let image = noise(200 * 30);
     for border in BORDERS {
         assert_eq!(direct(0.0).blur(&image, 200, border), image);
     }
-    assert_eq!(direct(0.0).spread(&image, 200), (image, 0));
+    assert_eq!(direct(0.0).blur_expanded(&image, 200), (image, 0));
 }
 
 #[test]
-fn a_constant_survives() {
+fn constants_are_preserved() {
     for sigma in WIDTHS {
         for method in [Method::Direct, Method::Decimated, Method::Auto] {
             let gaussian = Gaussian::truncated(sigma, method, 1e-7).unwrap();
@@ -84,13 +84,13 @@ fn a_constant_survives() {
 }
 
 #[test]
-fn the_sum_is_conserved() {
+fn sum_is_conserved() {
     let sum = |image: &[f32]| image.iter().copied().map(f64::from).sum::<f64>();
     let image = noise(61 * 47);
     for sigma in WIDTHS {
         for method in [Method::Direct, Method::Decimated, Method::Auto] {
             let gaussian = Gaussian::truncated(sigma, method, 1e-7).unwrap();
-            let spread = sum(&gaussian.spread(&image, 61).0) / sum(&image) - 1.0;
+            let spread = sum(&gaussian.blur_expanded(&image, 61).0) / sum(&image) - 1.0;
             assert!(spread.abs() < 1e-6, "{sigma}, {method:?}: {spread}");
         }
         let reflected = sum(&direct(sigma).blur(&image, 61, Border::Reflect)) / sum(&image) - 1.0;
@@ -98,11 +98,11 @@ fn the_sum_is_conserved() {
     }
 }
 
-/// Variance along x of what a single pixel becomes, and of its mean the distance from that pixel.
+/// Returns variance along x of the impulse response, and distance of its mean from the impulse.
 fn response(gaussian: &Gaussian, x: usize, y: usize) -> [f64; 2] {
     let mut image = vec![0.0; 17 * 17];
     image[y * 17 + x] = 1.0;
-    let (spread, margin) = gaussian.spread(&image, 17);
+    let (spread, margin) = gaussian.blur_expanded(&image, 17);
     let wide = 17 + 2 * margin;
     let moment = |p: i32| {
         let weigh = |(i, v): (usize, &f32)| {
@@ -115,7 +115,7 @@ fn response(gaussian: &Gaussian, x: usize, y: usize) -> [f64; 2] {
 }
 
 #[test]
-fn the_impulse_response_has_the_variance_asked_for() {
+fn impulse_response_has_the_requested_variance() {
     for sigma in WIDTHS.into_iter().chain([0.01, 1.7, 8.0]) {
         let [variance, mean] = response(&direct(sigma), 8, 8);
         assert!((variance - sigma * sigma).abs() <= 2e-6 * sigma * sigma, "{sigma}: {variance}");
@@ -137,9 +137,9 @@ fn decimated_keeps_the_variance_at_every_phase() {
 }
 
 #[test]
-fn one_blur_after_the_other_is_the_blur_of_the_summed_variance() {
-    // Of a unit impulse, as a share of the highest pixel: small kernels on a lattice are not
-    // closed under convolution, wide ones are.
+fn successive_blurs_add_their_variances() {
+    // Error for a unit impulse, relative to the highest pixel. Narrow kernels on a lattice are not closed under
+    // convolution; wide kernels are.
     let widths = [
         (0.1, 0.2, 2e-3),
         (0.5, 0.5, 0.13),
@@ -160,7 +160,7 @@ fn one_blur_after_the_other_is_the_blur_of_the_summed_variance() {
 }
 
 #[test]
-fn a_mirrored_image_gives_the_mirrored_blur() {
+fn mirrored_images_give_mirrored_blurs() {
     let (width, height) = (141, 75);
     let image = noise(width * height);
     let mirrored = |i: &[f32]| -> Vec<f32> { i.chunks(width).flat_map(|r| r.iter().rev().copied()).collect() };
@@ -179,7 +179,7 @@ fn a_mirrored_image_gives_the_mirrored_blur() {
 }
 
 #[test]
-fn a_shifted_object_gives_the_shifted_blur() {
+fn shifted_objects_give_shifted_blurs() {
     let (tile, wide) = (noise(40 * 40), 400);
     let placed = |x: usize, y: usize| {
         let mut image = vec![0.0; wide * 120];
@@ -202,12 +202,12 @@ fn a_shifted_object_gives_the_shifted_blur() {
 }
 
 #[test]
-fn an_object_spread_is_the_object_blurred_in_an_empty_frame() {
+fn blur_expanded_matches_a_blur_in_an_empty_frame() {
     for (width, height) in [(3, 5), (50, 41), (130, 20)] {
         let tile = noise(width * height);
         for sigma in [0.05, 0.9, 3.6] {
             let gaussian = direct(sigma);
-            let (spread, margin) = gaussian.spread(&tile, width);
+            let (spread, margin) = gaussian.blur_expanded(&tile, width);
             let wide = width + 2 * margin;
             let mut frame = vec![0.0; wide * (height + 2 * margin)];
             for (j, row) in tile.chunks(width).enumerate() {
@@ -219,7 +219,7 @@ fn an_object_spread_is_the_object_blurred_in_an_empty_frame() {
     }
 }
 
-/// White noise, a corner, a small disc and a smooth ramp, all from 0 to 1.
+/// Returns white noise, a corner, a small disc and a smooth ramp, all from 0 to 1.
 fn phantoms(width: usize, height: usize) -> [Vec<f32>; 4] {
     let image = |f: &dyn Fn(f32, f32) -> f32| -> Vec<f32> {
         (0..width * height).map(|i| f((i % width) as f32, (i / width) as f32)).collect()
@@ -237,7 +237,7 @@ fn phantoms(width: usize, height: usize) -> [Vec<f32>; 4] {
 }
 
 #[test]
-fn decimated_agrees_with_direct() {
+fn decimated_matches_direct() {
     let (width, height) = (301, 219);
     let images = phantoms(width, height);
     let mut scratch = Scratch::new();
@@ -256,15 +256,15 @@ fn decimated_agrees_with_direct() {
                     assert_ne!(blurred, exact, "{sigma} was not decimated");
                 }
             }
-            let (spread, _) = fast.spread(&images[2], width);
-            let error = largest_difference(&spread, &direct(sigma).spread(&images[2], width).0);
+            let (spread, _) = fast.blur_expanded(&images[2], width);
+            let error = largest_difference(&spread, &direct(sigma).blur_expanded(&images[2], width).0);
             assert!(error < bound, "{sigma}, spread: {error}");
         }
     }
 }
 
 #[test]
-fn no_image_errs_more_than_decimation_may() {
+fn decimation_error_is_bounded_for_every_image() {
     let width = 161;
     for (method, sigma, bound) in [
         (Method::Decimated, 2.81, 1e-3),
@@ -273,7 +273,7 @@ fn no_image_errs_more_than_decimation_may() {
         (Method::Auto, 7.2, 2e-4),
     ] {
         let fast = Gaussian::truncated(sigma, method, 1e-7).unwrap();
-        // How much each pixel of a row errs by if every other one is as bad for it as it can be.
+        // Largest error of each pixel of a row, with the worst values of all other pixels.
         let mut worst = vec![0.0; width];
         for x in 0..width {
             let mut row = vec![0.0; width];
@@ -281,7 +281,7 @@ fn no_image_errs_more_than_decimation_may() {
             let [fast, exact] = [&fast, &direct(sigma)].map(|gaussian| gaussian.blur(&row, width, Border::Replicate));
             worst.iter_mut().zip(fast.iter().zip(&exact)).for_each(|(sum, (a, b))| *sum += (a - b).abs());
         }
-        // Half of that of a range of 1, along each of two axes.
+        // Half of it for a range of 1, along both axes.
         let error = worst.iter().copied().fold(0.0, f32::max);
         assert!(error < bound, "{sigma}: {error}");
     }
@@ -298,7 +298,7 @@ fn narrow_kernels_are_never_decimated() {
 }
 
 #[test]
-fn rows_are_those_of_the_whole() {
+fn blurred_rows_match_the_complete_blur() {
     let (width, height) = (150, 43);
     let image = noise(width * height);
     let mut scratch = Scratch::new();
@@ -316,13 +316,13 @@ fn rows_are_those_of_the_whole() {
 }
 
 #[test]
-#[should_panic(expected = "rows of the 3 there are")]
-fn rows_beyond_the_last_are_a_mistake() {
+#[should_panic(expected = "exceed the 3 rows of the image")]
+fn rows_beyond_the_image_panic() {
     direct(1.0).blur_rows_into(&[0.0; 9], 3, Border::Zero, 2, &mut [0.0; 6], &mut Scratch::new());
 }
 
 #[test]
-fn a_truncated_kernel_errs_by_its_tail() {
+fn truncation_error_is_bounded_by_the_lost_tail() {
     let (width, height) = (301, 219);
     let images = phantoms(width, height);
     for (lost_tail, shorter) in [(1e-5, 0.9), (1e-4, 0.75), (1e-3, 0.65)] {
@@ -334,12 +334,12 @@ fn a_truncated_kernel_errs_by_its_tail() {
             for image in &images {
                 let blur = |gaussian: &Gaussian| gaussian.blur(image, width, Border::Reflect);
                 let error = f64::from(largest_difference(&blur(&short), &blur(&exact)));
-                // The worst image there is would err by 5.2 times that along each axis.
+                // The worst image has 5.2 times this error along each axis.
                 assert!(error < 5.0 * lost_tail, "{sigma}, {lost_tail}: {error}");
             }
         }
     }
-    // Decimated kernels are truncated likewise.
+    // Decimated kernels are truncated in the same way.
     for lost_tail in [1e-4, 1e-3, 1e-2] {
         for sigma in [3.5, 5.1, 8.0] {
             let short = Gaussian::truncated(sigma, Method::Auto, lost_tail).unwrap();
@@ -358,7 +358,7 @@ fn a_truncated_kernel_errs_by_its_tail() {
 }
 
 #[test]
-fn scratch_carries_nothing_from_call_to_call() {
+fn scratch_does_not_affect_results() {
     let mut scratch = Scratch::new();
     for (width, height, sigma) in [(300, 200, 20.0), (40, 30, 3.6), (131, 90, 9.9), (7, 5, 0.9), (90, 90, 30.0)] {
         let image = noise(width * height);
@@ -382,18 +382,18 @@ fn impossible_widths_are_refused() {
 }
 
 #[test]
-#[should_panic(expected = "not whole rows")]
-fn a_ragged_image_is_a_mistake() {
+#[should_panic(expected = "not a multiple of the width")]
+fn incomplete_rows_panic() {
     let _ = direct(1.0).blur(&[0.0; 10], 3, Border::Zero);
 }
 
 #[test]
-#[should_panic(expected = "dst has the wrong number of pixels")]
-fn a_short_destination_is_a_mistake() {
+#[should_panic(expected = "`dst` has the wrong number of pixels")]
+fn short_destinations_panic() {
     direct(1.0).blur_into(&[0.0; 9], 3, Border::Zero, &mut [0.0; 6], &mut Scratch::new());
 }
 
-/// The same bytes on every machine, whatever its vector instructions.
+/// Pins the output bytes, independent of vector instructions.
 #[test]
 fn bits_are_pinned() {
     let image = noise(211 * 97);

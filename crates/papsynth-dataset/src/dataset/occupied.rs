@@ -1,4 +1,4 @@
-//! What a folder holds already: another data set or slide, one around it, or one of another recipe.
+//! Checks of a folder for output: existing content, enclosing data sets or slides, differences of recipes.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -6,58 +6,60 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use super::record::FORMAT;
+use crate::bytes::sha256;
 use crate::error::Error;
-use crate::files::{Folder, is_temporary};
+use crate::files::{Folder, is_desktop_file, is_temporary};
 use crate::formats::names;
 
-/// What a slide's head is called, and the format it names.
+/// File name and format name of the head of a slide.
 pub(crate) const SLIDE: [&str; 2] = ["slide.json", "papsynth-slide"];
 
-/// Refuses a folder that lies within a data set or a slide: of that its files would be strays.
+/// Refuses a folder inside a data set or slide, in which its files would be untracked.
 pub(crate) fn refuse_nested(folder: &Folder) -> Result<(), Error> {
     if folder.is_remote() {
         return Ok(());
     }
-    match around(folder.root()) {
+    match enclosing(folder.root()) {
         Some(outer) => {
-            let message =
-                format!("lies within {}, which has files of its own; choose a folder beside it", outer.display());
+            let message = format!("is inside the data set or slide {}; choose a folder outside it", outer.display());
             Err(Error::folder(folder.root(), message))
         }
         None => Ok(()),
     }
 }
 
-/// The data set or slide around a path, whether there is something at the path or not.
-fn around(path: &Path) -> Option<PathBuf> {
+/// Returns the data set or slide that contains a path. The path itself need not exist.
+fn enclosing(path: &Path) -> Option<PathBuf> {
     let path = std::path::absolute(path).ok()?;
     let (known, is_itself) = match fs::canonicalize(&path) {
         Ok(known) => (known, true),
         Err(_) => (path.ancestors().skip(1).find_map(|above| fs::canonicalize(above).ok())?, false),
     };
-    known.ancestors().skip(usize::from(is_itself)).find(|folder| is_ours(folder)).map(Path::to_owned)
+    known.ancestors().skip(usize::from(is_itself)).find(|folder| is_output(folder)).map(Path::to_owned)
 }
 
-fn is_ours(folder: &Path) -> bool {
+/// Whether a folder is a data set or slide.
+fn is_output(folder: &Path) -> bool {
     [[names::MANIFEST, FORMAT], SLIDE].iter().any(|[name, format]| {
-        // The format stands at the beginning of what may be a long file.
+        // The format is at the beginning of a file that may be long.
         let mut begin = Vec::new();
         let read = File::open(folder.join(name)).and_then(|file| file.take(64).read_to_end(&mut begin));
         read.is_ok() && String::from_utf8_lossy(&begin).contains(&format!("\"{format}\""))
     })
 }
 
-/// The first of these files that is the head of a data set or slide in a folder below.
+/// Returns the first subfolder that is a data set or slide, from the names of files.
 pub(crate) fn nested_below<'n>(folder: &Folder, names: impl IntoIterator<Item = &'n String>) -> Option<PathBuf> {
     names.into_iter().find_map(|name| {
         let (inner, file) = name.rsplit_once('/')?;
         let inner = folder.path(inner);
-        ([names::MANIFEST, SLIDE[0]].contains(&file) && is_ours(&inner)).then_some(inner)
+        ([names::MANIFEST, SLIDE[0]].contains(&file) && is_output(&inner)).then_some(inner)
     })
 }
 
-/// Something in a folder, if it is there and not empty. What was never finished does not count.
-pub(crate) fn stranger(folder: &Folder) -> Result<Option<String>, Error> {
+/// Returns the name of any file or folder in a folder, or `None` if it is empty or missing. Temporary files and files
+/// of the desktop do not count.
+pub(crate) fn any_content(folder: &Folder) -> Result<Option<String>, Error> {
     if folder.is_remote() {
         return Ok(folder.names()?.into_iter().next());
     }
@@ -66,31 +68,38 @@ pub(crate) fn stranger(folder: &Folder) -> Result<Option<String>, Error> {
         Ok(entries) => entries,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
         Err(e) if e.kind() == io::ErrorKind::NotADirectory => {
-            let is =
-                if path.exists() { "is a file; a folder is wanted" } else { "lies below a file; a folder is wanted" };
+            let is = if path.exists() {
+                "expected a folder, found a file"
+            } else {
+                "a parent of this path is a file; expected a folder"
+            };
             return Err(Error::folder(path, is));
         }
         Err(e) => return Err(Error::io("read", path)(e)),
     };
     for entry in entries {
         let name = entry.map_err(Error::io("read", path))?.file_name().to_string_lossy().into_owned();
-        if !is_temporary(&name) {
+        if !is_temporary(&name) && !is_desktop_file(&name) {
             return Ok(Some(name));
         }
     }
     Ok(None)
 }
 
-/// Where the recipe in the folder first differs, in brackets; nothing where that cannot be told.
-pub(crate) fn recipe_difference(folder: &Folder, recipe: &str) -> String {
+/// Returns the first difference between the recipe in the folder and `recipe`, in parentheses; an empty string if it is
+/// unknown. `expected` is the SHA-256 of the recipe at the time of generation.
+pub(crate) fn recipe_difference(folder: &Folder, expected: &str, recipe: &str) -> String {
     let there = folder.inside(names::RECIPE).ok().and_then(|path| fs::read_to_string(path).ok());
+    if there.as_ref().is_some_and(|there| sha256(there.as_bytes()) != expected) {
+        return format!(" ({} was changed after generation)", names::RECIPE);
+    }
     let read = |text: &str| toml::from_str::<toml::Table>(text).ok();
     let both = there.and_then(|there| read(&there)).zip(read(recipe));
     let difference = both.and_then(|(there, here)| difference("", &there, &here));
     difference.map_or_else(String::new, |difference| format!(" ({difference})"))
 }
 
-/// The first field in which two recipes differ, and its values.
+/// Returns the first field in which two recipes differ, with its values.
 fn difference(section: &str, there: &toml::Table, here: &toml::Table) -> Option<String> {
     let names: BTreeSet<&String> = there.keys().chain(here.keys()).collect();
     names.into_iter().find_map(|name| {
@@ -99,8 +108,8 @@ fn difference(section: &str, there: &toml::Table, here: &toml::Table) -> Option<
             (Some(toml::Value::Table(there)), Some(toml::Value::Table(here))) => difference(&field, there, here),
             (there, here) if there == here => None,
             (there, here) => {
-                let shown = |value: Option<&toml::Value>| value.map_or("nothing".to_owned(), toml::Value::to_string);
-                Some(format!("`{field}` is {} there, {} here", shown(there), shown(here)))
+                let shown = |value: Option<&toml::Value>| value.map_or("unset".to_owned(), toml::Value::to_string);
+                Some(format!("`{field}` is {} there and {} here", shown(there), shown(here)))
             }
         }
     })

@@ -1,5 +1,4 @@
-//! A field as grey levels, where in it a patch may be taken, and a patch as it is sent: with noise, as a PNG of which nothing
-//! but the pixels differs between patches.
+//! Grey levels of fields, positions of patches, and patches with noise as PNG files that differ only in their pixels.
 
 use papsynth_dataset::read::{LevelImage, Limits, Stack};
 use png::{BitDepth, ColorType, Compression, Encoder, Filter};
@@ -9,52 +8,52 @@ use rand_core::Rng;
 use crate::error::Error;
 use crate::fields::{Field, bytes};
 
-/// Rows and columns at the border of a field that no patch holds, on either side: where planes were combined, or an image
-/// was put straight, they may be black.
+/// Rows and columns at each border of a field that are not shown: fusion of planes or registration can leave them
+/// black.
 const MARGIN_PX: usize = 8;
 
-/// Every how many-th pixel of every how many-th row is looked at to judge a patch.
+/// Stride of the sampled pixels and rows that decide whether a patch is shown.
 const STRIDE_PX: usize = 4;
 
-/// What counts as glass: the level that 95 % are darker than, so that specks of light do not matter.
+/// Quantile of the levels that defines the glass; bright specks are above it.
 const GLASS_QUANTILE: f64 = 0.95;
 
-/// If a patch is covered all over, the glass is at least so bright as this part of the field's: light falls off towards the
-/// corners by less.
-const LEAST_GLASS: f32 = 0.85;
+/// Lower bound of the glass level of a patch, as a fraction of that of the field. Uneven illumination reduces it by
+/// less.
+const MIN_GLASS: f32 = 0.85;
 
-/// Something lies where it is darker than this part of the glass; noise and uneven light are less.
-const SOMETHING: f32 = 0.92;
+/// A pixel below this fraction of the glass level is covered. Noise and uneven illumination reduce the level by less.
+const MAX_COVERED: f32 = 0.92;
 
-/// A patch is shown if something lies on so much of it.
-const LEAST_COVER: f64 = 0.2;
+/// Smallest covered fraction of a patch.
+const MIN_COVER: f64 = 0.2;
 
-/// Patches of one field share at most so much of their area.
-const MOST_OVERLAP: f64 = 0.25;
+/// Largest overlap of two patches of a field, as a fraction of their area.
+const MAX_OVERLAP: f64 = 0.25;
 
-/// Places that are tried in a field for each patch that is looked for.
+/// Random positions tried in a field for each patch.
 const TRIES: usize = 60;
 
 pub(crate) type Places = Vec<[usize; 2]>;
 
 #[derive(Debug, Clone)]
-pub(crate) struct Picture {
+pub(crate) struct GreyImage {
     pub(crate) width: usize,
     pub(crate) levels: Vec<f32>,
 }
 
-/// A picture as it stands in its file.
+/// An image as in its file.
 #[derive(Debug)]
 pub(crate) struct Raw {
-    pub(crate) picture: Picture,
+    pub(crate) image: GreyImage,
     pub(crate) bytes: Vec<u8>,
-    /// Whether the file holds more than 8 bits.
+    /// Whether the file has more than 8 bits.
     pub(crate) is_deep: bool,
 }
 
 impl Raw {
-    /// Reads a field. Of an image in colour, green: the channel that sees most of the stain, and the nearest to the 570 nm of the
-    /// paper. Of a stack, the plane in the middle.
+    /// Reads a field. Of a colour image it reads the green channel, which has the highest contrast and is nearest to
+    /// the 570 nm of the paper; of a stack the central plane.
     pub(crate) fn read(field: &Field) -> Result<Self, Error> {
         let limits = Limits::default();
         let bytes = bytes(&field.path, limits.max_file_bytes)?;
@@ -62,18 +61,18 @@ impl Raw {
         let is_stack = field.frame.as_ref().is_some_and(|frame| frame.summary.planes_um.len() > 1);
         if is_stack {
             let Stack { width, mut planes } = Stack::decode(&bytes, &limits).map_err(refuse)?;
-            let middle = planes.len() / 2;
-            let levels = if planes.is_empty() { Vec::new() } else { planes.swap_remove(middle) };
-            return Ok(Self { picture: Picture { width, levels }, bytes, is_deep: true });
+            let central = planes.len() / 2;
+            let levels = if planes.is_empty() { Vec::new() } else { planes.swap_remove(central) };
+            return Ok(Self { image: GreyImage { width, levels }, bytes, is_deep: true });
         }
         let LevelImage { width, channels, levels, white } = LevelImage::decode(&bytes, &limits).map_err(refuse)?;
         let green = if channels > 1 { 1 } else { 0 };
         let levels = levels.into_iter().skip(green).step_by(channels).map(f32::from).collect();
-        Ok(Self { picture: Picture { width, levels }, bytes, is_deep: white > u16::from(u8::MAX) })
+        Ok(Self { image: GreyImage { width, levels }, bytes, is_deep: white > u16::from(u8::MAX) })
     }
 }
 
-impl Picture {
+impl GreyImage {
     pub(crate) fn height(&self) -> usize {
         self.levels.len() / self.width.max(1)
     }
@@ -86,8 +85,8 @@ impl Picture {
         glass(&mut self.sample([0, 0], [self.width, self.height()], STRIDE_PX))
     }
 
-    /// The picture with pixels `factor` times as large, at least 1: each holds the mean of what lay on it, as a camera of
-    /// larger pixels would have it.
+    /// Resamples to pixels that are `factor` times as large: area-weighted means, as in a camera with larger pixels. A
+    /// factor up to 1 changes nothing.
     pub(crate) fn reduced(self, factor: f64) -> Self {
         if factor <= 1.0 {
             return self;
@@ -113,21 +112,21 @@ impl Picture {
         Self { width, levels }
     }
 
-    /// Levels of a rectangle, every `stride`-th along both axes.
+    /// Returns every `stride`-th level of a rectangle along both axes.
     fn sample(&self, [x, y]: [usize; 2], [width, height]: [usize; 2], stride: usize) -> Vec<f32> {
         let rows = self.levels.chunks_exact(self.width.max(1)).skip(y).take(height).step_by(stride);
         rows.flat_map(|row| row[x..x + width].iter().copied().step_by(stride)).collect()
     }
 
-    /// The levels of a square, if it lies in the picture.
+    /// Returns the levels of a square, or `None` if it extends beyond the image.
     pub(crate) fn square(&self, [x, y]: [usize; 2], side: usize) -> Option<Vec<f32>> {
         let is_inside = x.checked_add(side)? <= self.width && y.checked_add(side)? <= self.height();
         is_inside.then(|| self.sample([x, y], [side, side], 1))
     }
 
-    /// Up to `wanted` places of patches, left and top, in the order in which they were found: anywhere at random where
-    /// something lies on the patch and earlier ones are overlapped little. The same rule for both sides, and of ratios of levels
-    /// alone, so that exposure does not matter.
+    /// Returns up to `wanted` random positions (left, top) of patches that are sufficiently covered and have little
+    /// overlap. The rule is the same for real and synthetic fields, and depends only on ratios of levels, not on the
+    /// exposure.
     pub(crate) fn places<R: Rng + ?Sized>(&self, side: usize, wanted: usize, rng: &mut R) -> Places {
         let mut places = Places::new();
         let free = |length: usize| length.checked_sub(side + 2 * MARGIN_PX);
@@ -138,8 +137,8 @@ impl Picture {
                 break;
             }
             let place = [MARGIN_PX + below(right + 1, rng), MARGIN_PX + below(down + 1, rng)];
-            if places.iter().all(|other| overlap(place, *other, side) <= MOST_OVERLAP)
-                && self.cover(place, side, glass) >= LEAST_COVER
+            if places.iter().all(|other| overlap(place, *other, side) <= MAX_OVERLAP)
+                && self.cover(place, side, glass) >= MIN_COVER
             {
                 places.push(place);
             }
@@ -147,21 +146,21 @@ impl Picture {
         places
     }
 
-    /// On how much of a patch something lies.
+    /// Returns the covered fraction of a patch.
     fn cover(&self, place: [usize; 2], side: usize, field_glass: f32) -> f64 {
         let mut sample = self.sample(place, [side, side], STRIDE_PX);
-        let glass = glass(&mut sample).max(LEAST_GLASS * field_glass);
-        sample.iter().filter(|&&level| level < SOMETHING * glass).count() as f64 / sample.len().max(1) as f64
+        let glass = glass(&mut sample).max(MIN_GLASS * field_glass);
+        sample.iter().filter(|&&level| level < MAX_COVERED * glass).count() as f64 / sample.len().max(1) as f64
     }
 }
 
-/// The part of the area that two squares share.
+/// Returns the overlap of two squares as a fraction of their area.
 fn overlap(a: [usize; 2], b: [usize; 2], side: usize) -> f64 {
     let shared = |k: usize| side.saturating_sub(a[k].abs_diff(b[k])) as f64;
     shared(0) * shared(1) / (side * side) as f64
 }
 
-/// The level that [`GLASS_QUANTILE`] of a sample are darker than.
+/// Returns the [`GLASS_QUANTILE`] of a sample.
 fn glass(sample: &mut [f32]) -> f32 {
     if sample.is_empty() {
         return 0.0;
@@ -171,8 +170,8 @@ fn glass(sample: &mut [f32]) -> f32 {
     *sample.select_nth_unstable_by(place, f32::total_cmp).1
 }
 
-/// For each larger pixel along a line of `length` smaller ones: the first that it covers, and the part of its light that each
-/// gives.
+/// Returns for each larger pixel along a line of `length` pixels the first pixel that it covers, and the weights of
+/// all.
 fn weights(length: usize, factor: f64) -> Vec<(usize, Vec<f32>)> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to a length")]
     let whole = |x: f64| x as usize;
@@ -182,28 +181,28 @@ fn weights(length: usize, factor: f64) -> Vec<(usize, Vec<f32>)> {
             let (from, to) = (k as f64 * factor, (k + 1) as f64 * factor);
             let first = whole(from);
             let last = whole(to.ceil()).min(length);
-            #[expect(clippy::cast_possible_truncation, reason = "parts of a pixel")]
+            #[expect(clippy::cast_possible_truncation, reason = "fractions of a pixel")]
             let part = |i: usize| (((to.min((i + 1) as f64)) - from.max(i as f64)).max(0.0) / factor) as f32;
             (first, (first..last).map(part).collect())
         })
         .collect()
 }
 
-/// Adds Gaussian noise of `sigma` grey levels and rounds to 8 bits. Each pixel takes the same random numbers whatever its level.
+/// Adds Gaussian noise of `sigma` grey levels and rounds to 8 bits. The random numbers do not depend on the levels.
 pub(crate) fn noisy<R: Rng + ?Sized>(levels: &[f32], sigma: f64, rng: &mut R) -> Vec<u8> {
     let mut normals = Normals::new(rng);
     levels
         .iter()
         .map(|&level| {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates: black and white")]
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates at black and white")]
             let grey = (f64::from(level) + sigma * normals.draw() + 0.5) as u8;
             grey
         })
         .collect()
 }
 
-/// A square in 8-bit grey. It is not compressed, so that the size of the file is the same for all: what packs well and what
-/// does not would tell real from synthetic. It holds no chunk but those that every PNG has.
+/// Encodes a square of 8-bit grey levels. The file is not compressed: the size of a compressed file could distinguish
+/// real from synthetic patches. It has only the mandatory chunks.
 pub(crate) fn png(grey: &[u8], side: usize) -> Vec<u8> {
     let mut out = Vec::with_capacity(grey.len() + grey.len() / 64);
     let length = u32::try_from(side).unwrap_or_default();
@@ -216,7 +215,7 @@ pub(crate) fn png(grey: &[u8], side: usize) -> Vec<u8> {
         writer.write_image_data(grey)?;
         writer.finish()
     });
-    debug_assert!(written.is_ok(), "memory takes every byte, and the size is right: {written:?}");
+    debug_assert!(written.is_ok(), "the size is valid: {written:?}");
     out
 }
 
@@ -227,8 +226,8 @@ mod tests {
 
     use super::*;
 
-    fn field(width: usize, height: usize, level: impl Fn(usize, usize) -> f32) -> Picture {
-        Picture { width, levels: (0..width * height).map(|i| level(i % width, i / width)).collect() }
+    fn field(width: usize, height: usize, level: impl Fn(usize, usize) -> f32) -> GreyImage {
+        GreyImage { width, levels: (0..width * height).map(|i| level(i % width, i / width)).collect() }
     }
 
     fn rng() -> Xoshiro256PlusPlus {
@@ -236,16 +235,16 @@ mod tests {
     }
 
     #[test]
-    fn larger_pixels_hold_the_mean_of_what_lay_on_them() {
+    fn larger_pixels_are_means_of_smaller_ones() {
         let constant = field(37, 23, |_, _| 7.0).reduced(1.32);
         assert_eq!((constant.width, constant.height()), (28, 17));
         assert!(constant.levels.iter().all(|level| (level - 7.0).abs() < 1e-5));
-        // A slope stays the slope at the centres.
+        // A gradient is preserved at the pixel centres.
         let slope = field(40, 12, |x, y| x as f32 + 3.0 * y as f32).reduced(1.5);
         for (i, level) in slope.levels.iter().enumerate() {
             let centre = |k: usize| 1.5 * (k as f32 + 0.5) - 0.5;
             let wanted = centre(i % slope.width) + 3.0 * centre(i / slope.width);
-            // The mean of whole pixels that are cut is not quite that of the slope within them.
+            // Pixels are piecewise constant, so the means differ slightly from the gradient.
             assert!((level - wanted).abs() < 0.7, "{i}: {level} for {wanted}");
         }
         let halves = field(4, 2, |x, _| x as f32).reduced(2.0);
@@ -254,26 +253,26 @@ mod tests {
     }
 
     #[test]
-    fn patches_have_something_on_them_and_hardly_overlap() {
-        // Discs of half the light on uneven glass.
-        let picture = field(900, 700, |x, y| {
+    fn patches_are_covered_and_have_little_overlap() {
+        // Discs of half the intensity on unevenly illuminated glass.
+        let image = field(900, 700, |x, y| {
             let light = 230.0 - 0.02 * x as f32;
             let (dx, dy) = ((x % 300) as f32 - 150.0, (y % 300) as f32 - 150.0);
             if dx * dx + dy * dy < 80.0 * 80.0 { 0.5 * light } else { light }
         });
-        let places = picture.places(200, 8, &mut rng());
+        let places = image.places(200, 8, &mut rng());
         assert_eq!(places.len(), 8);
-        let glass = picture.glass();
+        let glass = image.glass();
         for (k, &[x, y]) in places.iter().enumerate() {
             assert!(
                 (MARGIN_PX..=900 - 200 - MARGIN_PX).contains(&x) && (MARGIN_PX..=700 - 200 - MARGIN_PX).contains(&y)
             );
-            assert!(picture.cover([x, y], 200, glass) >= LEAST_COVER);
-            assert!(places[..k].iter().all(|other| overlap([x, y], *other, 200) <= MOST_OVERLAP));
+            assert!(image.cover([x, y], 200, glass) >= MIN_COVER);
+            assert!(places[..k].iter().all(|other| overlap([x, y], *other, 200) <= MAX_OVERLAP));
         }
-        assert_eq!(places, picture.places(200, 8, &mut rng()), "the same seed gives the same places");
-        // Exposure does not matter.
-        let darker = Picture { width: picture.width, levels: picture.levels.iter().map(|l| l * 0.5).collect() };
+        assert_eq!(places, image.places(200, 8, &mut rng()), "the same seed gives the same positions");
+        // The exposure does not change the positions.
+        let darker = GreyImage { width: image.width, levels: image.levels.iter().map(|l| l * 0.5).collect() };
         assert_eq!(places, darker.places(200, 8, &mut rng()));
     }
 
@@ -281,7 +280,7 @@ mod tests {
     fn empty_glass_is_not_shown_and_covered_patches_are() {
         let uneven = field(600, 600, |x, y| 200.0 - 0.04 * (x + y) as f32 + ((x * 7 + y * 13) % 5) as f32);
         assert!(uneven.places(200, 3, &mut rng()).is_empty());
-        // Half of the field under a cell larger than a patch.
+        // A cell larger than a patch covers half of the field.
         let covered = field(1200, 500, |x, _| if x < 600 { 120.0 } else { 230.0 });
         let places = covered.places(200, 4, &mut rng());
         assert_eq!(places.len(), 4);
@@ -289,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn small_fields_give_no_place() {
+    fn small_fields_have_no_patches() {
         for (width, height) in [(0, 0), (1, 1), (215, 300), (300, 215)] {
             assert!(field(width, height, |_, _| 1.0).places(200, 2, &mut rng()).is_empty());
         }
@@ -297,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_has_the_deviation_that_is_asked_for() {
+    fn noise_has_the_specified_standard_deviation() {
         let mut rng = rng();
         let n = 200_000;
         for sigma in [0.7, 5.0] {

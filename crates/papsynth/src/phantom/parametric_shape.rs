@@ -1,4 +1,4 @@
-//! The paper's parametric shape (Eqs. 6, 7), a circle whose points are pushed about, and its Perlin texture.
+//! The paper's parametric shape (Eqs. 6, 7), a circle with perturbed points, and its Perlin texture.
 
 use perlin_bg::{Fractal, FractalParams, Window};
 use rand_core::Rng;
@@ -9,13 +9,13 @@ use crate::random;
 /// Points of the perturbed circle before it is smoothed (K of Eq. 7).
 const CORNERS: usize = 12;
 
-/// Points between two corners on the smooth curve through them.
-const BETWEEN: usize = 6;
+/// Curve points per corner.
+const POINTS_PER_CORNER: usize = 6;
 
-/// A closed curve about the origin (Eq. 7):
+/// Draws a closed curve around the origin (Eq. 7):
 /// xᵢ = s·\[U(−α, α) + cos(θᵢ + U(−β, β))\], yᵢ = s·\[U(−α, α) + sin(θᵢ + U(−β, β))\], with the points joined by a
 /// closed Catmull–Rom curve.
-pub(crate) fn wobbled_circle<R: Rng + ?Sized>(radius: f64, alpha: f64, beta: f64, rng: &mut R) -> Vec<Point> {
+pub(crate) fn perturbed_circle<R: Rng + ?Sized>(radius: f64, alpha: f64, beta: f64, rng: &mut R) -> Vec<Point> {
     let corners: Vec<Point> = (0..CORNERS)
         .map(|i| {
             // Eq. 6: (cos θ, sin θ) is the circle itself.
@@ -26,17 +26,17 @@ pub(crate) fn wobbled_circle<R: Rng + ?Sized>(radius: f64, alpha: f64, beta: f64
             [radius * (ax + libm::cos(theta + tx)), radius * (ay + libm::sin(theta + ty))]
         })
         .collect();
-    smooth(&corners, BETWEEN)
+    smooth(&corners, POINTS_PER_CORNER)
 }
 
-/// A closed Catmull–Rom curve through the corners.
-pub(crate) fn smooth(corners: &[Point], between: usize) -> Vec<Point> {
+/// Returns a closed Catmull–Rom curve through the corners, with `points` points per corner.
+pub(crate) fn smooth(corners: &[Point], points: usize) -> Vec<Point> {
     let n = corners.len();
-    let mut curve = Vec::with_capacity(n * between);
+    let mut curve = Vec::with_capacity(n * points);
     for i in 0..n {
         let [a, b, c, d] = [corners[(i + n - 1) % n], corners[i], corners[(i + 1) % n], corners[(i + 2) % n]];
-        for step in 0..between {
-            let t = step as f64 / between as f64;
+        for step in 0..points {
+            let t = step as f64 / points as f64;
             let at = |axis: usize| {
                 let (a, b, c, d) = (a[axis], b[axis], c[axis], d[axis]);
                 b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
@@ -47,7 +47,7 @@ pub(crate) fn smooth(corners: &[Point], between: usize) -> Vec<Point> {
     curve
 }
 
-/// Fills what a tile covers with an absorbance that Perlin noise varies, with cells of `cell_px` pixels about `centre`.
+/// Multiplies a tile by an absorbance modulated by Perlin noise, with cells of `cell_px` pixels, relative to `centre`.
 pub(crate) fn textured(
     tile: &mut Tile,
     centre: Point,
@@ -68,7 +68,7 @@ pub(crate) fn textured(
     }
 }
 
-/// A point turned by an angle about the origin and moved.
+/// Rotates a point about the origin and translates it by `centre`.
 pub(crate) fn placed(point: Point, angle: f64, centre: Point) -> Point {
     let (sin, cos) = (libm::sin(angle), libm::cos(angle));
     [centre[0] + point[0] * cos - point[1] * sin, centre[1] + point[0] * sin + point[1] * cos]
@@ -80,12 +80,12 @@ mod tests {
     use crate::key::Key;
 
     #[test]
-    fn perturbations_stay_within_their_range() {
+    fn perturbations_are_within_their_range() {
         let mut rng = Key { seed: 1, index: 0 }.stream("test", 0, "wobble");
-        // Without any it is the circle, also between its corners.
-        for (alpha, beta, step) in [(0.0, 0.0, 1), (0.2, 0.1, BETWEEN)] {
+        // Without perturbations the curve is the circle, also between corners.
+        for (alpha, beta, step) in [(0.0, 0.0, 1), (0.2, 0.1, POINTS_PER_CORNER)] {
             for _ in 0..200 {
-                for [x, y] in wobbled_circle(5.0, alpha, beta, &mut rng).into_iter().step_by(step) {
+                for [x, y] in perturbed_circle(5.0, alpha, beta, &mut rng).into_iter().step_by(step) {
                     let off = ((x * x + y * y).sqrt() / 5.0 - 1.0).abs();
                     assert!(off <= alpha * 2.0_f64.sqrt() + 1.1 * beta + 0.004, "{off}");
                 }

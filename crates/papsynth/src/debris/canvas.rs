@@ -1,20 +1,20 @@
-//! Painting an object on its own tile: what it covers, and what it absorbs there.
+//! Drawing of an object on a tile: its coverage and absorbance.
 
 use dye_spectra::Amounts;
 
-use crate::phantom::piece::{LEAST_ABSORBANCE, Phantom};
-use crate::phantom::pools::{Look, Pool, SIDE, Texels};
+use crate::phantom::noise_fields::{FieldSampler, NoiseField, SIDE, Texels};
+use crate::phantom::piece::{MIN_ABSORBANCE, Phantom};
 use crate::phantom::tile::{Point, Tile};
 
-/// An object that is being painted.
-pub(super) struct Painting {
-    /// Share of each pixel that it covers.
+/// The tile on which an object is drawn.
+pub(super) struct ObjectCanvas {
+    /// Fraction of each pixel that the object covers.
     pub(super) coverage: Tile,
-    /// What it absorbs there.
+    /// Absorbance of each pixel.
     pub(super) absorbance: Tile,
 }
 
-/// A straight stroke whose half-width changes evenly from one end to the other, with round ends; all in pixels.
+/// A straight stroke with round ends and linearly changing half-width, in pixels.
 #[derive(Clone, Copy)]
 pub(super) struct Stroke {
     pub(super) ends: [Point; 2],
@@ -22,12 +22,12 @@ pub(super) struct Stroke {
 }
 
 impl Stroke {
-    /// A stroke of even width.
+    /// Creates a stroke of constant width.
     pub(super) fn even(from: Point, to: Point, half_width: f64) -> Self {
         Self { ends: [from, to], half_widths: [half_width; 2] }
     }
 
-    /// How far inside its edge a point lies, and the half-width there.
+    /// Returns the distance of a point inside the edge, and the half-width there.
     fn depth(&self, p: Point) -> (f64, f64) {
         let [a, b] = self.ends;
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
@@ -39,37 +39,37 @@ impl Stroke {
         (half_width - (ex * ex + ey * ey).sqrt(), half_width)
     }
 
-    /// The share of a pixel that it covers: as far as its edge reaches into it.
-    fn share(&self, p: Point) -> f64 {
+    /// Returns the fraction of a pixel that it covers, from the distance of the pixel centre to the edge.
+    fn coverage(&self, p: Point) -> f64 {
         let (depth, half_width) = self.depth(p);
         (depth + 0.5).clamp(0.0, (2.0 * half_width).min(1.0))
     }
 }
 
-impl Painting {
-    /// An empty painting that reaches so many pixels beyond these points.
+impl ObjectCanvas {
+    /// Creates an empty canvas around points, with a margin in pixels.
     pub(super) fn around<'a>(points: impl IntoIterator<Item = &'a Point>, margin: f64) -> Self {
         let coverage = Tile::around(points, margin);
         Self { absorbance: coverage.blank(), coverage }
     }
 
-    /// An empty painting of the same place.
+    /// Creates an empty canvas of the same size and position.
     pub(super) fn blank(&self) -> Self {
         Self { coverage: self.coverage.blank(), absorbance: self.coverage.blank() }
     }
 
-    /// Takes what it covers away, to be covered anew.
-    pub(super) fn lifted(&mut self) -> Vec<f32> {
+    /// Returns the coverage and resets it to 0.
+    pub(super) fn take_coverage(&mut self) -> Vec<f32> {
         let blank = vec![0.0; self.coverage.values.len()];
         core::mem::replace(&mut self.coverage.values, blank)
     }
 
-    /// Absorbs so much wherever it covers something.
-    pub(super) fn even(&mut self, absorbance: f64) {
+    /// Sets a uniform absorbance where the object covers.
+    pub(super) fn fill_covered(&mut self, absorbance: f64) {
         self.shade(|_| absorbance);
     }
 
-    /// Absorbs as much as a function of the place says, wherever it covers something.
+    /// Sets the absorbance to a function of position where the object covers.
     pub(super) fn shade(&mut self, absorbance: impl Fn(Point) -> f64) {
         let mut covers = self.coverage.values.iter();
         self.absorbance.for_each(|p, value| {
@@ -79,20 +79,20 @@ impl Painting {
         });
     }
 
-    /// Absorbs as much as the share that it covers of a pixel, and that of something within it, say.
-    pub(super) fn layered(&mut self, inside: &[f32], absorbance: impl Fn(f32, f32) -> f32) {
+    /// Sets the absorbance to a function of the coverage of the object and of an inner region.
+    pub(super) fn shade_by_coverage(&mut self, inside: &[f32], absorbance: impl Fn(f32, f32) -> f32) {
         let values = self.absorbance.values.iter_mut().zip(&self.coverage.values).zip(inside);
         values.for_each(|((value, cover), inner)| *value = absorbance(*cover, *inner));
     }
 
-    /// Adds a stroke that absorbs so much where it covers a pixel, on top of what is there.
+    /// Draws a stroke; its absorbance is added to the existing one.
     pub(super) fn stroke(&mut self, stroke: &Stroke, absorbance: f64) {
-        self.blend(stroke, |value, share| *value += share * absorbance as f32);
+        self.blend(stroke, |value, coverage| *value += coverage * absorbance as f32);
     }
 
-    /// The same beside what is there: where strokes meet, the darker one counts.
-    pub(super) fn line(&mut self, stroke: &Stroke, absorbance: f64) {
-        self.blend(stroke, |value, share| *value = value.max(share * absorbance as f32));
+    /// Draws a stroke; where strokes overlap, the larger absorbance is used.
+    pub(super) fn stroke_max(&mut self, stroke: &Stroke, absorbance: f64) {
+        self.blend(stroke, |value, coverage| *value = value.max(coverage * absorbance as f32));
     }
 
     fn blend(&mut self, stroke: &Stroke, add: impl Fn(&mut f32, f32)) {
@@ -108,38 +108,38 @@ impl Painting {
         };
         for y in span(1, height) {
             for x in span(0, width) {
-                let share = stroke.share([x as f64 + origin[0], y as f64 + origin[1]]) as f32;
-                if share > 0.0 {
+                let coverage = stroke.coverage([x as f64 + origin[0], y as f64 + origin[1]]) as f32;
+                if coverage > 0.0 {
                     let at = y * width + x;
                     let cover = &mut self.coverage.values[at];
-                    *cover = cover.max(share);
-                    add(&mut self.absorbance.values[at], share);
+                    *cover = cover.max(coverage);
+                    add(&mut self.absorbance.values[at], coverage);
                 }
             }
         }
     }
 
-    /// Adds a polygon of even absorbance.
+    /// Adds a polygon of uniform absorbance.
     pub(super) fn fill(&mut self, polygon: &[Point], absorbance: f64) {
         let mut shape = self.coverage.blank();
         shape.cover(polygon);
-        self.lay(&shape, |share| share * absorbance as f32);
+        self.add_shape(&shape, |coverage| coverage * absorbance as f32);
     }
 
-    /// Adds a tile of the painting's own size, of which each share of a pixel absorbs so much.
-    pub(super) fn lay(&mut self, shape: &Tile, absorbance: impl Fn(f32) -> f32) {
+    /// Adds a shape, given by its coverage on a tile of the same size; `absorbance` is a function of the coverage.
+    pub(super) fn add_shape(&mut self, shape: &Tile, absorbance: impl Fn(f32) -> f32) {
         let values = self.coverage.values.iter_mut().zip(&mut self.absorbance.values);
-        for ((cover, value), share) in values.zip(&shape.values) {
-            *cover = cover.max(*share);
-            *value += absorbance(*share);
+        for ((cover, value), coverage) in values.zip(&shape.values) {
+            *cover = cover.max(*coverage);
+            *value += absorbance(*coverage);
         }
     }
 
-    /// Visits every row with a field of a pool: where it starts, its coverage, its absorbance, and the field's values.
+    /// Calls `visit` for every row with its first pixel, coverage, absorbance, and values of a noise field.
     pub(super) fn rows(
         &mut self,
-        pool: &Pool,
-        look: &Look,
+        noise_field: &NoiseField,
+        sampler: &FieldSampler,
         mut visit: impl FnMut(Point, &mut [f32], &mut [f32], &[f32]),
     ) {
         let (width, [x, y]) = (self.coverage.width, self.coverage.origin);
@@ -147,32 +147,32 @@ impl Painting {
         let mut texels: Texels = [0.0; SIDE + 1];
         let covers = self.coverage.values.chunks_exact_mut(width);
         for (row, (cover, value)) in covers.zip(self.absorbance.values.chunks_exact_mut(width)).enumerate() {
-            pool.row_into(&mut field, look, [0.0, row as f64], &mut texels);
+            noise_field.row_into(&mut field, sampler, [0.0, row as f64], &mut texels);
             visit([x as f64, y as f64 + row as f64], cover, value, &field);
         }
     }
 
-    /// Multiplies what it absorbs by 1 + strength · field, but by no less than 0.
-    pub(super) fn texture(&mut self, pool: &Pool, look: &Look, strength: f32) {
-        self.rows(pool, look, |_, _, values, field| {
+    /// Multiplies the absorbance by max(1 + strength · field, 0).
+    pub(super) fn texture(&mut self, noise_field: &NoiseField, sampler: &FieldSampler, strength: f32) {
+        self.rows(noise_field, sampler, |_, _, values, field| {
             for (value, field) in values.iter_mut().zip(field) {
                 *value *= (1.0 + strength * field).max(0.0);
             }
         });
     }
 
-    /// The object, through which light comes late by `phase_rad` where it absorbs `absorbance`.
-    pub(super) fn finish(mut self, dyes: Amounts, phase_rad: f64, absorbance: f64) -> Phantom {
-        if absorbance < LEAST_ABSORBANCE {
-            // What only refracts has its phase counted by its absorbance.
-            let scale = (LEAST_ABSORBANCE / absorbance.max(f64::MIN_POSITIVE)) as f32;
+    /// Returns the phantom, with phase delay `phase_rad` where the absorbance is `absorbance`.
+    pub(super) fn into_phantom(mut self, dyes: Amounts, phase_rad: f64, absorbance: f64) -> Phantom {
+        if absorbance < MIN_ABSORBANCE {
+            // Phase delay is stored per absorbance, so non-absorbing objects need a minimum.
+            let scale = (MIN_ABSORBANCE / absorbance.max(f64::MIN_POSITIVE)) as f32;
             let values = self.absorbance.values.iter_mut().zip(&self.coverage.values);
             for (value, cover) in values {
-                *value = if absorbance > 0.0 { *value * scale } else { cover * LEAST_ABSORBANCE as f32 };
+                *value = if absorbance > 0.0 { *value * scale } else { cover * MIN_ABSORBANCE as f32 };
             }
         }
-        let area = self.coverage.values.iter().map(|share| f64::from(*share)).sum();
-        Phantom::whole(self.absorbance, self.coverage, area, dyes).refracting(phase_rad, absorbance)
+        let area = self.coverage.values.iter().map(|coverage| f64::from(*coverage)).sum();
+        Phantom::whole(self.absorbance, self.coverage, area, dyes).with_phase(phase_rad, absorbance)
     }
 }
 
@@ -181,27 +181,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn strokes_cover_their_area_and_absorb_what_they_are_told() {
+    fn strokes_have_the_specified_area_and_absorbance() {
         for (to, half_width) in [([30.2, 17.7], 2.3), ([3.1, 4.2], 5.0), ([14.0, 4.2], 1.4)] {
             let from = [3.1, 4.2];
-            let mut painting = Painting::around(&[from, to], half_width + 2.0);
-            painting.stroke(&Stroke::even(from, to, half_width), 0.25);
+            let mut canvas = ObjectCanvas::around(&[from, to], half_width + 2.0);
+            canvas.stroke(&Stroke::even(from, to, half_width), 0.25);
             let (dx, dy): (f64, f64) = (to[0] - from[0], to[1] - from[1]);
             let length = (dx * dx + dy * dy).sqrt();
             let area = 2.0 * half_width * length + core::f64::consts::PI * half_width * half_width;
-            let covered: f64 = painting.coverage.values.iter().map(|v| f64::from(*v)).sum();
-            let absorbed: f64 = painting.absorbance.values.iter().map(|v| f64::from(*v)).sum();
+            let covered: f64 = canvas.coverage.values.iter().map(|v| f64::from(*v)).sum();
+            let absorbed: f64 = canvas.absorbance.values.iter().map(|v| f64::from(*v)).sum();
             assert!((covered / area - 1.0).abs() < 0.03, "{covered} {area}");
             assert!((absorbed / covered - 0.25).abs() < 1e-6);
         }
     }
 
     #[test]
-    fn a_stroke_beyond_the_tile_is_cut_off() {
-        let mut painting = Painting::around(&[[0.0, 0.0]], 3.0);
-        painting.stroke(&Stroke::even([-40.0, 0.0], [40.0, 0.0], 1.0), 1.0);
-        painting.stroke(&Stroke::even([90.0, 90.0], [90.0, 90.0], 2.0), 1.0);
-        let covered: f64 = painting.coverage.values.iter().map(|v| f64::from(*v)).sum();
+    fn a_stroke_outside_the_tile_is_clipped() {
+        let mut canvas = ObjectCanvas::around(&[[0.0, 0.0]], 3.0);
+        canvas.stroke(&Stroke::even([-40.0, 0.0], [40.0, 0.0], 1.0), 1.0);
+        canvas.stroke(&Stroke::even([90.0, 90.0], [90.0, 90.0], 2.0), 1.0);
+        let covered: f64 = canvas.coverage.values.iter().map(|v| f64::from(*v)).sum();
         assert!((covered - 14.0).abs() < 1e-6, "{covered}");
     }
 }

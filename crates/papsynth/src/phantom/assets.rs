@@ -1,4 +1,4 @@
-//! What all images of one recipe share: models, meshes, donors, plans.
+//! Data shared by all images of one recipe: shape models, cloth mesh, donors, noise field plans.
 
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
@@ -8,29 +8,29 @@ use fsd_shape::{Descriptors, ShapeModel};
 use quilt_texture::QuiltParams;
 use voronoi_cytoskeleton::{DescentPath, Skeleton, SkeletonParams, Torus};
 
-use super::chromatin::Donors;
-use super::pools::PoolMaker;
+use super::chromatin::DonorSet;
+use super::noise_fields::NoiseFieldGenerator;
 use super::tile::Point;
 use crate::error::Cause;
 use crate::key::{Key, Stream};
-use crate::model::{CellClass, Form, Model, Shapes};
-use crate::profile::Watch;
+use crate::model::{CellClass, Model, OutlineForm, Shapes};
+use crate::profile::StageTimer;
 use crate::random;
 use crate::recipe::{Acceptance, Recipe, Seam, ShapeSpread, Sheet};
 
+/// Data for drawing phantoms, shared by all images of one recipe.
 #[derive(Debug)]
-pub(crate) struct Studio {
+pub(crate) struct PhantomAssets {
     pub(crate) recipe: Recipe,
-    pub(crate) classes: BTreeMap<String, ClassStudio>,
-    /// The mesh of all sheets, if cells have any.
+    pub(crate) classes: BTreeMap<String, ClassAssets>,
+    /// Cloth simulation of cytoplasm sheets; `None` for flat sheets.
     pub(crate) cloth: Option<Cloth>,
     pub(crate) cytoskeletons: Cytoskeletons,
-    pub(crate) pools: PoolMaker,
-    pub(crate) watch: Watch,
+    pub(crate) noise_fields: NoiseFieldGenerator,
+    pub(crate) timer: StageTimer,
 }
 
-/// What cytoskeletons are grown with: relaxed diagrams of which every cell takes a piece of its own, the same for every
-/// image. Each is made when a cell first asks for it.
+/// Relaxed Voronoi diagrams for cytoskeletons, the same for every image. Each is computed on first use.
 #[derive(Debug)]
 pub(crate) struct Cytoskeletons {
     skeleton: Skeleton,
@@ -38,28 +38,27 @@ pub(crate) struct Cytoskeletons {
     tori: [OnceLock<Torus>; TORI],
 }
 
-/// Number of diagrams. A cell's piece is a quarter of one, at any place and turned any way, and its springs are its own: no two
-/// look alike.
+/// Number of diagrams. A cell uses a quarter of one, at a random position and rotation and with random edge weights.
 const TORI: usize = 4;
 
-/// Sites of each: of 300 for a cell, enough for one three times as long as wide.
+/// Sites per diagram: with 300 per cell, enough for a cell three times as long as wide.
 const TORUS_SITES: usize = 1200;
 
-/// What cells of one class are made with.
+/// Data for drawing the cells of one class.
 #[derive(Debug)]
-pub(crate) struct ClassStudio {
+pub(crate) struct ClassAssets {
     pub(crate) class: CellClass,
     cytoplasm: ShapeModel,
     nucleus: ShapeModel,
-    pub(crate) donors: Donors,
+    pub(crate) donors: DonorSet,
     pub(crate) quilt: QuiltParams,
 }
 
-impl Studio {
-    pub(crate) fn new(recipe: &Recipe, model: &Model, watch: Watch) -> Result<Self, Cause> {
+impl PhantomAssets {
+    pub(crate) fn new(recipe: &Recipe, model: &Model, timer: StageTimer) -> Result<Self, Cause> {
         let mut classes = BTreeMap::new();
         for name in recipe.cells.keys() {
-            classes.insert(name.clone(), ClassStudio::new(name, model.class(name)?, recipe)?);
+            classes.insert(name.clone(), ClassAssets::new(name, model.class(name)?, recipe)?);
         }
         let cloth = match recipe.cytoplasm.sheet {
             Sheet::Flat => None,
@@ -69,10 +68,10 @@ impl Studio {
         Ok(Self {
             recipe: recipe.clone(),
             classes,
-            cloth: cloth.map(|params| Cloth::new(&params).expect("the cloths that ship are valid")),
+            cloth: cloth.map(|params| Cloth::new(&params).expect("the built-in cloth parameters are valid")),
             cytoskeletons: Cytoskeletons::new(),
-            pools: PoolMaker::new(),
-            watch,
+            noise_fields: NoiseFieldGenerator::new(),
+            timer,
         })
     }
 }
@@ -80,23 +79,23 @@ impl Studio {
 impl Cytoskeletons {
     fn new() -> Self {
         let params = SkeletonParams::default();
-        let skeleton = Skeleton::new(&params).expect("the defaults are valid");
+        let skeleton = Skeleton::new(&params).expect("the default parameters are valid");
         Self { skeleton, lloyd_passes: params.lloyd_passes, tori: Default::default() }
     }
 
-    /// Returns the cytoskeleton of one cell in its outline.
+    /// Returns the cytoskeleton lines of one cell inside its outline.
     pub(crate) fn grow(&self, outline: &[Point], rng: &mut Stream) -> Result<Vec<DescentPath>, Cause> {
         let number = random::below(TORI, rng);
         let torus = self.tori[number].get_or_init(|| {
-            let mut own = Key { seed: 0, index: 0 }.stream("studio", number as u64, "torus");
-            let torus = Torus::new(TORUS_SITES, self.lloyd_passes, &mut own);
-            torus.expect("a diagram of so many sites can be made")
+            let mut torus_rng = Key { seed: 0, index: 0 }.stream("studio", number as u64, "torus");
+            let torus = Torus::new(TORUS_SITES, self.lloyd_passes, &mut torus_rng);
+            torus.expect("a diagram with this number of sites is valid")
         });
         Ok(self.skeleton.grow_from(torus, outline, rng)?)
     }
 }
 
-impl ClassStudio {
+impl ClassAssets {
     fn new(name: &str, class: &CellClass, recipe: &Recipe) -> Result<Self, Cause> {
         let model = |shapes: &Shapes, spread: ShapeSpread| {
             let statistics = match spread {
@@ -108,39 +107,39 @@ impl ClassStudio {
         };
         let cytoplasm = model(&class.cytoplasm.shapes, recipe.cytoplasm.shape)?;
         let nucleus = model(&class.nucleus.shapes, recipe.nucleus.shape)?;
-        let donors = Donors::new(name, &class.nucleus, &nucleus)?;
+        let donors = DonorSet::new(name, &class.nucleus, &nucleus)?;
         let quilt = quilt(recipe, class, donors.pixel_um);
         Ok(Self { class: class.clone(), cytoplasm, nucleus, donors, quilt })
     }
 
-    /// The outline of a cell's cytoplasm, of so many pixels' radius, its long axis along x.
+    /// Draws the outline of a cytoplasm with this radius, its long axis along x.
     pub(crate) fn cytoplasm(&self, radius_px: f64, rng: &mut Stream) -> Result<Descriptors, Cause> {
         let drawn = self.cytoplasm.draw(radius_px, rng)?;
-        Ok(posed(&drawn.descriptors, &self.class.cytoplasm.form, rng))
+        Ok(formed(&drawn.descriptors, &self.class.cytoplasm.form, rng))
     }
 
-    /// That of its nucleus.
+    /// Draws the outline of a nucleus with this radius, its long axis along x.
     pub(crate) fn nucleus(&self, radius_px: f64, rng: &mut Stream) -> Result<Descriptors, Cause> {
         let drawn = self.nucleus.draw(radius_px, rng)?;
-        Ok(posed(&drawn.descriptors, &self.class.nucleus.form, rng))
+        Ok(formed(&drawn.descriptors, &self.class.nucleus.form, rng))
     }
 }
 
-/// Most elongated outline: half axes of 1.8 and 0.2.
-const LONGEST: f64 = 0.8;
+/// Largest elongation: half axes of 1.8 and 0.2.
+const MAX_ELONGATION: f64 = 0.8;
 
-/// A drawn shape, its long axis along x, with the form of its class: how that differs from learned ones.
-fn posed(drawn: &Descriptors, form: &Form, rng: &mut Stream) -> Descriptors {
-    let posed = drawn.aligned();
-    let elongation = form.elongation.map(|e| (e.mean + e.sd * random::normal(rng)).clamp(0.0, LONGEST));
+/// Aligns a drawn shape with its long axis along x and applies the outline form of its class.
+fn formed(drawn: &Descriptors, form: &OutlineForm, rng: &mut Stream) -> Descriptors {
+    let aligned = drawn.aligned();
+    let elongation = form.elongation.map(|e| (e.mean + e.sd * random::normal(rng)).clamp(0.0, MAX_ELONGATION));
     if elongation.is_none() && form.taper == 0.0 && form.unevenness == 1.0 {
-        return posed;
+        return aligned;
     }
-    let middle = posed.harmonics();
-    let radius = posed.radius();
-    let mut terms = posed.as_slice().to_vec();
-    for (place, term) in terms.iter_mut().enumerate() {
-        match (place.abs_diff(middle), place < middle) {
+    let centre = aligned.harmonics();
+    let radius = aligned.radius();
+    let mut terms = aligned.as_slice().to_vec();
+    for (index, term) in terms.iter_mut().enumerate() {
+        match (index.abs_diff(centre), index < centre) {
             (0, _) | (1, false) => {}
             (1, true) => {
                 if let Some(elongation) = elongation {
@@ -150,36 +149,36 @@ fn posed(drawn: &Descriptors, form: &Form, rng: &mut Stream) -> Descriptors {
             _ => *term = [form.unevenness * term[0], form.unevenness * term[1]],
         }
     }
-    if let Some(egg) = terms.get_mut(middle + 2) {
-        egg[0] += form.taper * radius;
+    if let Some(asymmetry) = terms.get_mut(centre + 2) {
+        asymmetry[0] += form.taper * radius;
     }
-    // A form so extreme that the outline crosses itself is not taken.
+    // Ignores forms that make the outline cross itself.
     match Descriptors::from_harmonics(terms) {
-        Ok(formed) if !fsd_shape::self_intersects(&formed.outline(CHECKED)) => formed,
-        _ => posed,
+        Ok(changed) if !fsd_shape::self_intersects(&changed.outline(TEST_POINTS)) => changed,
+        _ => aligned,
     }
 }
 
-/// Points at which an outline is checked for crossing itself.
-const CHECKED: usize = 240;
+/// Points of the outline for the self-intersection test.
+const TEST_POINTS: usize = 240;
 
-/// The quilting that a recipe asks for, on donors with pixels of a size.
+/// Returns the quilting parameters of a recipe for donors with this pixel size.
 fn quilt(recipe: &Recipe, class: &CellClass, pixel_um: f64) -> QuiltParams {
     let nucleus = &recipe.nucleus;
     let pixels = |um: f64, least: usize| random::count(um / pixel_um).max(least);
-    // Patch and overlap are those in the middle of their range: a quilt has patches of one size.
-    let middle = |number: &crate::recipe::Number| number.bounds().iter().sum::<f64>() / 2.0;
-    let (overlap_px, core_px) = (pixels(middle(&nucleus.overlap_um), 1), pixels(middle(&nucleus.patch_um), 2));
+    // All patches of a quilt have the same size: the midpoints of the recipe's ranges.
+    let midpoint = |number: &crate::recipe::Number| number.bounds().iter().sum::<f64>() / 2.0;
+    let (overlap_px, core_px) = (pixels(midpoint(&nucleus.overlap_um), 1), pixels(midpoint(&nucleus.patch_um), 2));
     let patch_px = core_px + overlap_px;
     let default = QuiltParams::default();
     QuiltParams {
         patch_px: patch_px.max(2 * overlap_px),
         overlap_px,
         acceptance: match nucleus.acceptance {
-            // Donors are scaled to a standard deviation of one, and so is the threshold.
+            // DonorSet are scaled to a standard deviation of 1; the threshold is scaled with them.
             Acceptance::Threshold => quilt_texture::Acceptance::Threshold {
-                d_max: middle(&nucleus.d_max) / class.nucleus.chromatin.sd.mean.max(1e-6),
-                max_tries: TRIES,
+                d_max: midpoint(&nucleus.d_max) / class.nucleus.chromatin.sd.mean.max(1e-6),
+                max_tries: MAX_TRIES,
             },
             Acceptance::Near => default.acceptance,
         },
@@ -191,5 +190,5 @@ fn quilt(recipe: &Recipe, class: &CellClass, pixel_um: f64) -> QuiltParams {
     }
 }
 
-/// Random candidates before the best of them is taken, where none is near enough.
-const TRIES: usize = 400;
+/// Maximum number of random candidates before the best one is used.
+const MAX_TRIES: usize = 400;

@@ -1,4 +1,4 @@
-//! Pictures for people: truth drawn over the image.
+//! Images with outlines of the ground truth, and the contact sheet.
 
 use std::io;
 use std::path::Path;
@@ -12,23 +12,23 @@ use crate::read::LevelImage;
 use crate::write::{self, rgb_png};
 use papsynth::white_level as white;
 
-/// A picture in colour.
+/// A colour image with 8 bits a channel.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Picture {
+pub struct RgbImage {
     /// Columns.
     pub width: usize,
     /// Red, green and blue of each pixel, row by row.
     pub rgb: Vec<u8>,
 }
 
-impl Picture {
-    /// A plane as it is, in 8 bits.
+impl RgbImage {
+    /// Converts a plane to 8 bits.
     #[must_use]
     pub fn plain(plane: &Plane, finished: &Finished) -> Self {
         Self::of(plane, finished, &[])
     }
 
-    /// A plane with the outlines of all objects: cytoplasm green, nuclei orange, everything else blue.
+    /// Converts a plane and draws the outlines of all objects: cytoplasm green, nuclei orange, debris blue.
     #[must_use]
     pub fn overlay(plane: &Plane, finished: &Finished) -> Self {
         let objects = &finished.truth.objects;
@@ -38,18 +38,18 @@ impl Picture {
 
     fn of(plane: &Plane, finished: &Finished, masks: &[(Group, Mask)]) -> Self {
         let (view, camera) = (&finished.scene.view, &finished.scene.camera);
-        let mut picture = Self::blank(view.width, view.height, BACKGROUND);
+        let mut drawn = Self::blank(view.width, view.height, BACKGROUND);
         let levels = plane.grey.clone();
         let image = LevelImage { width: view.width, channels: plane.channels, levels, white: white(camera.bits) };
         let place = Place { x: 0, y: 0, width: view.width, height: view.height };
-        picture.draw(&image, image.white, masks, place);
-        picture
+        drawn.draw(&image, image.white, masks, place);
+        drawn
     }
 
-    /// The picture as a PNG file.
+    /// Encodes the image as a PNG file.
     ///
     /// # Errors
-    /// If it has no pixel, or more columns or rows than PNG allows.
+    /// If it is empty, or larger than PNG allows.
     pub fn to_png(&self) -> io::Result<Vec<u8>> {
         rgb_png(&self.rgb, self.width)
     }
@@ -67,7 +67,7 @@ impl Picture {
         }
     }
 
-    /// Draws an image, no larger than it is, and outlines over it.
+    /// Draws an image, downscaled to `place`, and outlines over it.
     fn draw(&mut self, image: &LevelImage, white: u16, masks: &[(Group, Mask)], place: Place) {
         let (width, height) = (image.width, image.height());
         for y in 0..place.height {
@@ -86,7 +86,7 @@ impl Picture {
                 self.set(place.x + x, place.y + y, colour);
             }
         }
-        // Nuclei lie over everything else, as they are looked at most.
+        // Nuclei are drawn last, over the other outlines.
         for group in [Group::Cytoplasm, Group::Debris, Group::Nucleus] {
             for (_, mask) in masks.iter().filter(|(of, _)| *of == group) {
                 for [x, y] in edge(mask) {
@@ -98,7 +98,7 @@ impl Picture {
         }
     }
 
-    /// Writes digits; other characters are left blank.
+    /// Draws digits; other characters are blank.
     fn write(&mut self, text: &str, x: usize, y: usize) {
         for (i, digit) in text.chars().map(|c| c.to_digit(10)).enumerate() {
             let rows = digit.map_or([0; 7], |d| DIGITS[d as usize]);
@@ -113,6 +113,7 @@ impl Picture {
     }
 }
 
+/// A rectangle in the target image, px.
 #[derive(Debug, Clone, Copy)]
 struct Place {
     x: usize,
@@ -123,7 +124,7 @@ struct Place {
 
 const BACKGROUND: [u8; 3] = [32; 3];
 
-/// Colours that people with defective colour vision tell apart, too (Okabe and Ito).
+/// Colours that are distinguishable with colour vision deficiency (Okabe and Ito).
 fn colour(group: Group) -> [u8; 3] {
     match group {
         Group::Cytoplasm => [0, 158, 115],
@@ -132,7 +133,7 @@ fn colour(group: Group) -> [u8; 3] {
     }
 }
 
-/// Digits of 5 x 7 pixels; the highest of the five bits is the leftmost.
+/// Digits of 5 x 7 pixels; the highest of the 5 bits is the leftmost pixel.
 const DIGITS: [[u8; 7]; 10] = [
     [0x0E, 0x11, 0x13, 0x15, 0x19, 0x11, 0x0E],
     [0x04, 0x0C, 0x04, 0x04, 0x04, 0x04, 0x0E],
@@ -146,16 +147,16 @@ const DIGITS: [[u8; 7]; 10] = [
     [0x0E, 0x11, 0x11, 0x0F, 0x01, 0x02, 0x0C],
 ];
 
-/// Pixels of `from` that fall into pixel `i` of `to`; at least one.
+/// Returns the source pixels, of `from`, of target pixel `i`, of `to`; at least 1.
 fn span(i: usize, to: usize, from: usize) -> std::ops::Range<usize> {
     let start = i * from / to;
     start..((i + 1) * from / to).max(start + 1).min(from)
 }
 
-/// The pixels of a mask with a neighbour outside it.
+/// Returns the pixels of a mask with a neighbour outside it.
 fn edge(mask: &Mask) -> Vec<[u32; 2]> {
     let Some(bounds) = mask.bounds() else { return Vec::new() };
-    // A pixel wider on every side, so that each pixel has four neighbours.
+    // A margin of 1 pixel gives each pixel four neighbours.
     let width = bounds.width as usize + 2;
     let at = |x: u32, y: u32| (y - bounds.y + 1) as usize * width + (x - bounds.x + 1) as usize;
     let mut inside = vec![false; width * (bounds.height as usize + 2)];
@@ -167,17 +168,17 @@ fn edge(mask: &Mask) -> Vec<[u32; 2]> {
     pixels.filter(|&[x, y]| on_edge(at(x, y))).collect()
 }
 
-/// Small pictures of the first frames with their truth, side by side, each under its name.
+/// Thumbnails of the first frames with outlines and names.
 pub(crate) struct ContactSheet {
-    pub(crate) picture: Picture,
+    pub(crate) image: RgbImage,
     frames: usize,
 }
 
 impl ContactSheet {
-    /// More are not shown.
+    /// Largest number of frames.
     pub(crate) const MAX_FRAMES: usize = 24;
     const COLUMNS: usize = 4;
-    /// Largest picture of a frame: a quarter of the default field.
+    /// Largest size of a thumbnail, px: a quarter of the default field.
     const SIZE: [usize; 2] = [344, 260];
     const GAP: usize = 8;
     const CAPTION: usize = 22;
@@ -187,7 +188,7 @@ impl ContactSheet {
         let columns = shown.min(Self::COLUMNS);
         let [width, height] = Self::cell();
         let rows = shown.div_ceil(columns);
-        Self { picture: Picture::blank(columns * width + Self::GAP, rows * height + Self::GAP, BACKGROUND), frames: 0 }
+        Self { image: RgbImage::blank(columns * width + Self::GAP, rows * height + Self::GAP, BACKGROUND), frames: 0 }
     }
 
     fn cell() -> [usize; 2] {
@@ -199,13 +200,13 @@ impl ContactSheet {
         let x = Self::GAP + self.frames % Self::COLUMNS * cell_width;
         let y = Self::GAP + self.frames / Self::COLUMNS * cell_height;
         self.frames += 1;
-        self.picture.write(name, x, y);
+        self.image.write(name, x, y);
         let [width, height] = fitted([image.width, image.height()], Self::SIZE);
-        self.picture.draw(image, white, masks, Place { x, y: y + Self::CAPTION, width, height });
+        self.image.draw(image, white, masks, Place { x, y: y + Self::CAPTION, width, height });
     }
 }
 
-/// The largest size of the same proportions within a box, and not larger than it was.
+/// Returns the largest size of the same aspect ratio within a box, without upscaling.
 fn fitted([width, height]: [usize; 2], [most_width, most_height]: [usize; 2]) -> [usize; 2] {
     if width <= most_width && height <= most_height {
         [width, height]
@@ -216,10 +217,10 @@ fn fitted([width, height]: [usize; 2], [most_width, most_height]: [usize; 2]) ->
     }
 }
 
-/// Writes grey levels, row by row, the channels of a pixel side by side, as a PNG.
+/// Writes grey levels (row by row, channels interleaved) as a PNG file.
 ///
 /// # Errors
-/// If the system refuses; then there is no such file, or still the former one.
+/// If the file cannot be written. An existing file is then unchanged.
 pub fn write_png(
     path: &Path,
     levels: &[u16],

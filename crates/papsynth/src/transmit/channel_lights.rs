@@ -1,36 +1,40 @@
-//! The lights of which a picture is made: one, those of three channels, or many single wavelengths.
+//! The lights that form an image: one, one for each of three channels, or many single wavelengths.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
 use optics_psf::{Microscope, MicroscopeParams, PatchImager, Zernike};
 
-use super::canvas::Mixer;
-use super::light::Slide;
+use super::light::Specimen;
+use super::object_transmission::DyeMixer;
 use crate::error::Cause;
 use crate::recipe::Mixing;
 use crate::scene::{SceneLight, SceneMicroscope};
 use crate::threads;
 
-/// Light that is imaged together, because dyes are mixed for all of it at once.
-pub(super) struct Group {
-    pub(super) mixer: Mixer,
-    pub(super) lights: Vec<ColouredLight>,
-    /// What each piece of each object has in the object's absorbance, light by light.
-    pub(super) shares: Vec<Vec<Vec<f64>>>,
+/// Lights that are imaged together because their dyes are mixed in one step.
+pub(super) struct LightGroup {
+    pub(super) mixer: DyeMixer,
+    pub(super) lights: Vec<ChannelLight>,
+    /// For each object, light and piece: the fraction of the object's absorbance.
+    pub(super) fractions: Vec<Vec<Vec<f64>>>,
 }
 
-/// Light of one wavelength or of the band of one channel.
-pub(super) struct ColouredLight {
+/// Light of one wavelength, or of the band of one channel.
+pub(super) struct ChannelLight {
     pub(super) imager: Arc<PatchImager>,
-    /// Travel of the stage that this light needs beyond the others', µm.
+    /// Axial chromatic shift of the stage position, µm.
     pub(super) shift_um: f64,
-    /// Its share in each channel of the picture.
+    /// Weight in each channel of the image.
     pub(super) weights: Vec<f64>,
 }
 
-/// The lights of a scene, each with its microscope.
-pub(super) fn groups(slide: Slide<'_>, optics: &SceneMicroscope, lenses: &Lenses) -> Result<Vec<Group>, Cause> {
-    let scene = slide.scene;
+/// Returns the lights of a scene with their microscopes.
+pub(super) fn light_groups(
+    specimen: Specimen<'_>,
+    optics: &SceneMicroscope,
+    microscopes: &MicroscopeCache,
+) -> Result<Vec<LightGroup>, Cause> {
+    let scene = specimen.scene;
     let params = |wavelength_um: f64, bandwidth_um: f64| MicroscopeParams {
         na: optics.na,
         condenser_na: optics.condenser_na,
@@ -47,25 +51,25 @@ pub(super) fn groups(slide: Slide<'_>, optics: &SceneMicroscope, lenses: &Lenses
         },
         pixel_um: scene.view.pixel_um,
         oversampling: optics.oversampling as usize,
-        // Glare is added to the finished light: a microscope is remembered whatever the glare of a field.
+        // Stray light is added later, so cached microscopes do not depend on it.
         stray_light: 0.0,
     };
-    let group = |mixer: Mixer, lights: Vec<ColouredLight>| {
-        let shares = threads::map(slide.threads, slide.phantoms, |phantom| mixer.shares(phantom));
-        Group { mixer, lights, shares }
+    let group = |mixer: DyeMixer, lights: Vec<ChannelLight>| {
+        let fractions = threads::map(specimen.threads, specimen.phantoms, |phantom| mixer.fractions(phantom));
+        LightGroup { mixer, lights, fractions }
     };
     match scene.light {
         SceneLight::Monochrome { wavelength_um, bandwidth_um } => {
-            let imager = lenses.get(&params(wavelength_um, bandwidth_um))?;
-            let light = ColouredLight { imager, shift_um: 0.0, weights: vec![1.0] };
-            Ok(vec![group(Mixer::Monochrome(wavelength_um), vec![light])])
+            let imager = microscopes.get(&params(wavelength_um, bandwidth_um))?;
+            let light = ChannelLight { imager, shift_um: 0.0, weights: vec![1.0] };
+            Ok(vec![group(DyeMixer::Monochrome(wavelength_um), vec![light])])
         }
         SceneLight::Colour { chromatic_um, mixing, lamp_k, .. } => {
             let colour = crate::detect::colour(lamp_k, mixing)?;
             let light = |wavelength_um: f64, bandwidth_um: f64, weights: Vec<f64>| {
-                let imager = lenses.get(&params(wavelength_um, bandwidth_um))?;
+                let imager = microscopes.get(&params(wavelength_um, bandwidth_um))?;
                 let shift_um = chromatic_um * (wavelength_um - GREEN_UM) / (RED_UM - GREEN_UM);
-                Ok(ColouredLight { imager, shift_um, weights })
+                Ok(ChannelLight { imager, shift_um, weights })
             };
             let channels = colour.channels();
             if mixing == Mixing::PerWavelength {
@@ -75,7 +79,7 @@ pub(super) fn groups(slide: Slide<'_>, optics: &SceneMicroscope, lenses: &Lenses
                     .map(|((red, green), blue)| {
                         let weights = [red, green, blue].map(|node| node.weight).to_vec();
                         let light = light(red.wavelength_um, 0.0, weights)?;
-                        Ok(group(Mixer::Monochrome(red.wavelength_um), vec![light]))
+                        Ok(group(DyeMixer::Monochrome(red.wavelength_um), vec![light]))
                     })
                     .collect();
             }
@@ -83,37 +87,37 @@ pub(super) fn groups(slide: Slide<'_>, optics: &SceneMicroscope, lenses: &Lenses
             let lights = channels.iter().enumerate();
             let lights = lights.map(|(c, of)| light(of.wavelength_um, of.bandwidth_um, own(c)));
             let lights = lights.collect::<Result<_, Cause>>()?;
-            Ok(vec![group(Mixer::Colour(Box::new(colour)), lights)])
+            Ok(vec![group(DyeMixer::Colour(Box::new(colour)), lights)])
         }
     }
 }
 
-/// The two wavelengths between which the chromatic shift is told, µm.
+/// Wavelengths between which the chromatic shift is specified, µm.
 const GREEN_UM: f64 = 0.55;
 const RED_UM: f64 = 0.65;
 
-/// Microscopes that are remembered: a colour image needs three, one of single wavelengths sixteen.
-const REMEMBERED: usize = 20;
+/// Capacity of the cache: a colour image needs 3 microscopes, one of single wavelengths 16.
+const CACHE_SIZE: usize = 20;
 
-/// Microscopes that an engine met before, with everything that was computed for them.
+/// A cache of microscopes with their computed filters.
 #[derive(Debug, Default)]
-pub(crate) struct Lenses {
-    known: Mutex<Vec<Arc<PatchImager>>>,
+pub(crate) struct MicroscopeCache {
+    cached: Mutex<Vec<Arc<PatchImager>>>,
 }
 
-impl Lenses {
-    /// The microscope of these parameters.
+impl MicroscopeCache {
+    /// Returns the microscope with these parameters.
     fn get(&self, params: &MicroscopeParams) -> Result<Arc<PatchImager>, Cause> {
-        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        let imager = match known.iter().position(|imager| imager.microscope().params() == params) {
-            Some(at) => known.remove(at),
+        let mut cached = self.cached.lock().unwrap_or_else(PoisonError::into_inner);
+        let imager = match cached.iter().position(|imager| imager.microscope().params() == params) {
+            Some(at) => cached.remove(at),
             None => Arc::new(PatchImager::new(&Microscope::new(params)?)),
         };
-        if known.len() == REMEMBERED {
-            known.remove(0);
+        if cached.len() == CACHE_SIZE {
+            cached.remove(0);
         }
-        // Those used last stand last.
-        known.push(Arc::clone(&imager));
+        // Most recently used last.
+        cached.push(Arc::clone(&imager));
         Ok(imager)
     }
 }

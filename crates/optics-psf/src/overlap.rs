@@ -2,31 +2,29 @@ use core::f64::consts::PI;
 
 use crate::pupil::{Pupil, turn};
 
-/// The integral over the lens in which the condenser's disc and the objective's, displaced by a
-/// frequency, overlap:
+/// Integral over the overlap of the condenser's disc with the objective's disc, shifted by a frequency:
 ///
-/// E(f) = 1/S₀ ∫ circ(|s + f|) exp 2πi [W(s + f) − W(s)] ds, s over the condenser's disc, S₀ its area.
+/// E(f) = 1/S₀ ∫ circ(|s + f|) exp 2πi [W(s + f) − W(s)] ds, with s in the condenser's disc of area S₀.
 ///
-/// Along f the lens is cut in two where its outline changes from one circle to the other, and a
-/// quadratic map takes the square root out of the pointed ends, so that Gauss–Legendre rules
-/// converge fast. Their lengths follow the fringes of the integrand. Where nothing on the pupil has
-/// a direction, half of the lens says all.
+/// The overlap is split along f where its outline changes from one circle to the other. A quadratic map removes the
+/// square root at its pointed ends, so that Gauss–Legendre rules converge fast. The number of nodes follows the fringes
+/// of the integrand. For a rotationally symmetric pupil, half of the overlap suffices.
 #[derive(Debug, Default)]
-pub(crate) struct Lens {
-    rules: Rules,
-    /// Nodes, and their weights, one after the other.
+pub(crate) struct OverlapIntegral {
+    rules: QuadratureRules,
+    /// Coordinates and weights of the nodes.
     x: Vec<f64>,
     y: Vec<f64>,
     weight: Vec<f64>,
 }
 
-/// Nodes along f: so many, and so many more for each fringe.
+/// Nodes along f: a minimum, and the number per fringe.
 const ALONG: (usize, f64) = (8, 3.0);
-/// The same across, from the axis to the outline.
+/// Nodes across f, from the axis to the outline.
 const ACROSS: (usize, f64) = (3, 2.0);
 
-impl Lens {
-    /// E at frequency `f` >= 0 in the direction (cos, sin).
+impl OverlapIntegral {
+    /// Returns E at the frequency `f` >= 0 in the direction (cos, sin).
     pub(crate) fn integral(&mut self, pupil: &Pupil, f: f64, direction: [f64; 2]) -> [f64; 2] {
         for list in [&mut self.x, &mut self.y, &mut self.weight] {
             list.clear();
@@ -37,72 +35,72 @@ impl Lens {
             return [0.0; 2];
         }
         let crossing = if f > outer - inner { (outer * outer - inner * inner - f * f) / (2.0 * f) } else { 0.0 };
-        let middle = crossing.clamp(-inner, right);
-        self.segment(pupil, f, direction, -inner, middle);
-        self.segment(pupil, f, direction, right, middle);
+        let split = crossing.clamp(-inner, right);
+        self.segment(pupil, f, direction, -inner, split);
+        self.segment(pupil, f, direction, right, split);
         let area = PI * inner * inner;
         sum(pupil, f, direction, &self.x, &self.y, &self.weight).map(|part| part / area)
     }
 
-    /// The part between the pointed end and the middle.
-    fn segment(&mut self, pupil: &Pupil, f: f64, direction: [f64; 2], end: f64, middle: f64) {
+    /// Adds the nodes of the part between a pointed end and the split.
+    fn segment(&mut self, pupil: &Pupil, f: f64, direction: [f64; 2], end: f64, split: f64) {
         let half_height = |x: f64| {
             let (inner, outer) = (pupil.condenser, pupil.objective);
             let square = (inner * inner - x * x).min(outer * outer - (x + f) * (x + f));
             square.max(0.0).sqrt()
         };
         let difference = |x: f64, y: f64| waves(pupil, direction, x + f, y) - waves(pupil, direction, x, y);
-        let turned = |range: f64, (least, more): (usize, f64)| {
+        let node_count = |range: f64, (least, more): (usize, f64)| {
             let fringes = range.abs().min(1000.0) * more;
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 4000")]
             let extra = fringes as usize;
             least + extra
         };
-        let width = middle - end;
-        let fringes = difference(middle, 0.0) - difference(end, 0.0);
-        let along = self.rules.get(turned(fringes, ALONG)).to_vec();
+        let width = split - end;
+        let fringes = difference(split, 0.0) - difference(end, 0.0);
+        let along = self.rules.get(node_count(fringes, ALONG)).to_vec();
         for [t, w] in along {
             let x = end + width * t * t;
             let weight = 2.0 * width.abs() * t * w;
             let height = half_height(x);
             let axis = difference(x, 0.0);
             let fringes = (difference(x, height) - axis).abs() + (difference(x, -height) - axis).abs();
-            // An even rule's upper half lies on 0..1 of the half height.
-            let across = self.rules.get(turned(fringes, ACROSS) * 2);
+            // The upper half of an even rule covers 0..1 of the half height.
+            let across = self.rules.get(node_count(fringes, ACROSS) * 2);
             for &[u, v] in &across[across.len() / 2..] {
                 let y = height * (2.0 * u - 1.0);
-                let share = weight * 2.0 * height * v;
+                let weight = weight * 2.0 * height * v;
                 if pupil.is_round() {
                     self.x.push(x);
                     self.y.push(y);
-                    self.weight.push(2.0 * share);
+                    self.weight.push(2.0 * weight);
                 } else {
                     self.x.extend([x, x]);
                     self.y.extend([y, -y]);
-                    self.weight.extend([share, share]);
+                    self.weight.extend([weight, weight]);
                 }
             }
         }
     }
 }
 
-/// Longest rule. A lens with more fringes than that resolves transfers nothing.
+/// Largest rule. A pupil with more fringes transfers nothing.
 const LONGEST: usize = 1024;
 
-/// Gauss–Legendre rules on 0..1 of 2, 4, … nodes, made when first asked for.
+/// Gauss–Legendre rules on 0..1 with 2, 4, … nodes, computed on demand.
 #[derive(Debug, Default)]
-pub(crate) struct Rules {
-    made: Vec<Vec<[f64; 2]>>,
+pub(crate) struct QuadratureRules {
+    cached: Vec<Vec<[f64; 2]>>,
 }
 
-impl Rules {
-    /// Nodes and weights of a rule with at least `nodes` nodes, an even number, ascending.
+impl QuadratureRules {
+    /// Returns nodes and weights of a rule with at least `nodes` nodes, an even number, in ascending order.
     pub(crate) fn get(&mut self, nodes: usize) -> &[[f64; 2]] {
         let half = nodes.clamp(2, LONGEST).div_ceil(2);
-        if self.made.len() <= half {
-            self.made.resize(half + 1, Vec::new());
+        if self.cached.len() <= half {
+            self.cached.resize(half + 1, Vec::new());
         }
-        let rule = &mut self.made[half];
+        let rule = &mut self.cached[half];
         if rule.is_empty() {
             *rule = gauss_legendre(2 * half);
         }
@@ -110,13 +108,13 @@ impl Rules {
     }
 }
 
-/// Newton's method on the Legendre polynomial of degree `n`.
+/// Computes a rule by Newton's method on the Legendre polynomial of degree `n`.
 fn gauss_legendre(n: usize) -> Vec<[f64; 2]> {
     let degree = n as f64;
     let node = |i: usize| {
         let mut x = -libm::cos(PI * (i as f64 + 0.75) / (degree + 0.5));
         let mut slope = 1.0;
-        // The first guess is right to a few digits, and each step doubles them.
+        // The initial value is accurate to a few digits, and each step doubles them.
         for _ in 0..6 {
             let (mut p, mut before) = (1.0, 0.0);
             for k in 0..n {
@@ -131,7 +129,7 @@ fn gauss_legendre(n: usize) -> Vec<[f64; 2]> {
     (0..n).map(node).collect()
 }
 
-/// W at a point given along and across `direction`.
+/// Returns W at a point given along and across `direction`.
 fn waves(pupil: &Pupil, [c, s]: [f64; 2], x: f64, y: f64) -> f64 {
     pupil.waves([c * x - s * y, s * x + c * y])
 }
@@ -149,7 +147,7 @@ fn sum(pupil: &Pupil, f: f64, direction: [f64; 2], x: &[f64], y: &[f64], weight:
     total
 }
 
-/// Partial sums that are kept side by side: their order is the same for every instruction set.
+/// Parallel partial sums: their order is the same for every instruction set.
 const LANES: usize = 8;
 
 #[multiversion::multiversion(targets = "simd")]
@@ -179,7 +177,7 @@ mod tests {
     use super::*;
     use crate::{MicroscopeParams, Zernike};
 
-    /// The midpoint rule on rings of the condenser's disc.
+    /// Reference: the midpoint rule on rings of the condenser's disc.
     fn oracle(pupil: &Pupil, f: f64, direction: [f64; 2]) -> [f64; 2] {
         let (rings, spokes) = (500_u32, 700_u32);
         let mut sum = [0.0; 2];
@@ -199,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn the_lens_is_the_disc_cut_by_the_disc() {
+    fn overlap_integral_matches_the_midpoint_rule() {
         let (round, sided) =
             (Zernike::default(), Zernike { coma: [0.15, -0.05], astigmatism: [0.0, 0.1], ..Zernike::default() });
         let cases = [
@@ -213,21 +211,21 @@ mod tests {
             (0.6, 2.0, 0.0, sided, [0.6, -0.8]),
             (0.6, 2.0, 0.0, sided, [-0.6, 0.8]),
         ];
-        let mut lens = Lens::default();
+        let mut overlap = OverlapIntegral::default();
         for (condenser_na, depth, stage, zernike, direction) in cases {
             let params = MicroscopeParams { condenser_na, zernike, ..MicroscopeParams::default() };
             let pupil = Pupil::new(&params, 0.57, depth, stage);
             for k in 0..14 {
                 let f = pupil.cutoff() * (f64::from(k) + 0.3) / 14.0;
-                let ([a, b], [c, d]) = (lens.integral(&pupil, f, direction), oracle(&pupil, f, direction));
+                let ([a, b], [c, d]) = (overlap.integral(&pupil, f, direction), oracle(&pupil, f, direction));
                 assert!((a - c).abs().max((b - d).abs()) < 7e-4, "{condenser_na} {depth} {stage} {f}: {a} {b} {c} {d}");
             }
         }
     }
 
     #[test]
-    fn rules_are_exact_for_polynomials() {
-        let mut rules = Rules::default();
+    fn quadrature_rules_are_exact_for_polynomials() {
+        let mut rules = QuadratureRules::default();
         for nodes in [2, 4, 7, 16, 64, 300] {
             let rule = rules.get(nodes);
             assert!(rule.len() >= nodes && rule.len() % 2 == 0);

@@ -1,26 +1,26 @@
-//! A cell that is being made, and what it is made with.
+//! A cell and the shared data for drawing its phantom.
 
-use super::pools::Pools;
-use super::studio::Studio;
+use super::assets::PhantomAssets;
+use super::noise_fields::NoiseFields;
 use crate::key::Stream;
 use crate::scene::{CellBody, Object, Scene};
 
-/// A cell that is being made, and what it is made with.
+/// A cell and the shared data for drawing its phantom.
 #[derive(Clone, Copy)]
-pub(super) struct Cell<'a> {
-    pub(super) studio: &'a Studio,
+pub(super) struct CellContext<'a> {
+    pub(super) assets: &'a PhantomAssets,
     pub(super) scene: &'a Scene,
-    pub(super) pools: &'a Pools<'a>,
+    pub(super) noise_fields: &'a NoiseFields<'a>,
     pub(super) object: &'a Object,
     pub(super) body: &'a CellBody,
 }
 
-impl Cell<'_> {
+impl CellContext<'_> {
     pub(super) fn stream(&self, purpose: &str) -> Stream {
         self.scene.stream("cell", self.object, purpose)
     }
 
-    /// Size of a pixel of its sheet.
+    /// Pixel size of the sheet, µm.
     pub(super) fn pixel_um(&self) -> f64 {
         self.scene.sheet_grid().pixel_um
     }

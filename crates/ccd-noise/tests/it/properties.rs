@@ -1,4 +1,4 @@
-//! Laws of the noise and of the camera. All bounds are in standard errors under named seeds.
+//! Statistical properties of noise and camera. Bounds are in standard errors, with fixed seeds.
 
 use ccd_noise::{Camera, CameraParams, NoiseField, PhotonNoise, ReadNoise};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -6,17 +6,18 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 const KEY: u64 = 0x00e1_ec72_0000_0015;
 
-/// A camera of 12 bits whose pixels are alike.
+/// Returns a 12-bit camera without fixed pattern.
 fn twelve_bits() -> CameraParams {
     CameraParams { gain_dn_per_e: 3995.0 / 17_600.0, offset_dn: 100.0, bit_depth: 12, ..CameraParams::default() }
 }
 
-/// Number of draws of a statistical test: 10⁵, or 10⁶ if `PAPSYNTH_TORTURE` is set. Bounds are in standard errors and hold for both.
+/// Returns the number of draws of a statistical test: 10⁵, or 10⁶ if `PAPSYNTH_TORTURE` is set. Both use the same
+/// bounds in standard errors.
 fn draws() -> usize {
     if std::env::var_os("PAPSYNTH_TORTURE").is_some() { 1_000_000 } else { 100_000 }
 }
 
-/// Deviates of one mean, 1000 to a row.
+/// Returns deviates of one mean, in rows of 1000.
 fn poisson(mean: f32, n: usize) -> Vec<f64> {
     let mut counts = vec![0.0; n];
     NoiseField::new(KEY).poisson_into(&vec![mean; n], 1000, [0, 0], &mut counts);
@@ -33,7 +34,7 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Mean of (value - centre)ᵖ.
+/// Returns the mean of (value - centre)ᵖ.
 fn moment(values: &[f64], centre: f64, p: i32) -> f64 {
     let power = |v: &f64| (0..p).fold(1.0, |m, _| m * (v - centre));
     values.iter().map(power).sum::<f64>() / values.len() as f64
@@ -51,7 +52,7 @@ fn index(count: f64) -> usize {
 }
 
 #[test]
-fn poisson_deviates_follow_the_law() {
+fn poisson_deviates_follow_the_distribution() {
     for mu in MEANS {
         let counts = poisson(mu, draws());
         let n = counts.len() as f64;
@@ -83,7 +84,7 @@ fn poisson_deviates_follow_the_law() {
 }
 
 #[test]
-fn poisson_moments_are_the_laws() {
+fn poisson_moments_match_the_distribution() {
     for mu in MEANS {
         let counts = poisson(mu, draws());
         let (n, mu) = (counts.len() as f64, f64::from(mu));
@@ -91,7 +92,7 @@ fn poisson_moments_are_the_laws() {
             let z = error / (variance / n).sqrt();
             assert!(z.abs() < 4.0, "mean {mu}: {what}, {z} standard errors");
         };
-        // Central moments of the law, of which that of order 2p gives the error of order p.
+        // Central moments of the distribution; the moment of order 2p gives the standard error of that of order p.
         let [m2, m3] = [mu, mu];
         let m4 = mu + 3.0 * mu * mu;
         let m6 = mu + 25.0 * mu * mu + 15.0 * mu * mu * mu;
@@ -102,7 +103,7 @@ fn poisson_moments_are_the_laws() {
 }
 
 #[test]
-fn a_deviate_depends_on_nothing_but_its_mean_and_place() {
+fn a_deviate_depends_only_on_mean_and_position() {
     let (width, field) = (333, NoiseField::new(KEY));
     let means: Vec<f32> = (0..width * 20).map(|i| [0.0, 3.0, 19.0, 25.0, 4e3][i * 7 % 5]).collect();
     let mut mixed = vec![0.0; means.len()];
@@ -117,7 +118,7 @@ fn a_deviate_depends_on_nothing_but_its_mean_and_place() {
 }
 
 #[test]
-fn what_is_no_mean_counts_as_dark() {
+fn invalid_means_count_as_dark() {
     let means = [-0.0, f32::NAN, -5.0, f32::NEG_INFINITY, 5e3, f32::INFINITY, 0.0];
     let mut counts = [1.0; 7];
     NoiseField::new(KEY).poisson_into(&means, 7, [0, 0], &mut counts);
@@ -143,7 +144,7 @@ fn normal_deviates_are_normal() {
     let below = |x: f64| 0.5 * libm::erfc(-x / std::f64::consts::SQRT_2);
     let distance =
         deviates.iter().enumerate().map(|(i, &x)| (below(x) - (i as f64 + 0.5) / n as f64).abs()).fold(0.0, f64::max);
-    // Kolmogorov and Smirnov, at the level of 0.1 %.
+    // Kolmogorov–Smirnov test at the 0.1 % level.
     assert!(distance < 1.95 / (n as f64).sqrt(), "{distance}");
 }
 
@@ -154,7 +155,7 @@ fn assert_uncorrelated(what: &str, a: &[f64], b: &[f64]) {
 }
 
 #[test]
-fn frames_and_neighbours_are_independent() {
+fn frames_and_neighbouring_pixels_are_independent() {
     let n = draws();
     let frame = normal(KEY, n);
     for (other, name) in [(KEY + 1, "next key"), (KEY ^ 1 << 63, "far key"), (!KEY, "inverse")] {
@@ -165,7 +166,7 @@ fn frames_and_neighbours_are_independent() {
         let squares: Vec<f64> = frame.iter().map(|x| x * x).collect();
         assert_uncorrelated(&format!("squares, lag {lag}"), &squares[lag..], &squares[..n - lag]);
     }
-    // Shot and read noise of the same pixel.
+    // Shot noise and read noise of the same pixel.
     for mu in [2.0, 19.0, 25.0, 9000.0] {
         assert_uncorrelated("shot and read", &frame, &poisson(mu, n));
     }
@@ -180,13 +181,13 @@ fn noises() -> [PhotonNoise; 4] {
     ]
 }
 
-/// Dark to overexposed, with pixels of every size in each block.
+/// Returns means from dark to overexposed; every block contains all magnitudes.
 fn scene(width: usize, height: usize) -> Vec<f32> {
     (0..width * height).map(|i| [0.0, 2.0, 19.0, 300.0, 500.0, 14e3, 3e4][i * i % 7]).collect()
 }
 
 #[test]
-fn a_window_is_the_frame_seen_through_it() {
+fn windows_match_the_frame() {
     let (width, height) = (301, 57);
     let electrons = scene(width, height);
     for photon_noise in noises() {
@@ -212,7 +213,7 @@ fn a_window_is_the_frame_seen_through_it() {
 }
 
 #[test]
-fn a_frame_takes_one_word_and_is_the_window_of_that_key() {
+fn expose_into_takes_one_word_as_key() {
     let (width, height) = (200, 10);
     let electrons = scene(width, height);
     let camera = Camera::new(&CameraParams::default()).unwrap();
@@ -228,9 +229,9 @@ fn a_frame_takes_one_word_and_is_the_window_of_that_key() {
     assert_eq!(rng.next_u64(), same.next_u64());
 }
 
-/// 12 bits, which leave room for 50 levels; two frames of each.
+/// 12 bits leave room for 50 levels of two frames each.
 #[test]
-fn the_photon_transfer_curve_gives_the_gain() {
+fn photon_transfer_curve_gives_the_gain() {
     let params = twelve_bits();
     let n = 256 * 320;
     for photon_noise in [PhotonNoise::Exact, PhotonNoise::NormalAbove { mean_e: 300.0 }] {
@@ -251,7 +252,7 @@ fn the_photon_transfer_curve_gives_the_gain() {
         }
         let (dark, dark_variance) = points[0];
         assert!((dark - params.offset_dn).abs() < 0.02, "{dark}");
-        // EMVA 1288: y-dark through the origin.
+        // EMVA 1288: a line through the origin, above dark.
         let [xy, xx] = points.iter().fold([0.0; 2], |[xy, xx], (m, v)| {
             let (x, y) = (m - dark, v - dark_variance);
             [xy + x * y, xx + x * x]
@@ -260,7 +261,7 @@ fn the_photon_transfer_curve_gives_the_gain() {
         assert!((gain / params.gain_dn_per_e - 1.0).abs() < 0.01, "{gain}");
         let read_noise = (dark_variance - 1.0 / 12.0).sqrt() / gain;
         assert!((read_noise / params.read_noise.rms_e() - 1.0).abs() < 0.02, "{read_noise}");
-        // Shot-limited signal to noise ratio, read noise and rounding taken off.
+        // Shot-noise limited SNR, without read noise and quantisation noise.
         let (m, v) = points[40];
         let snr = (m - dark) / (v - dark_variance).sqrt();
         assert!((snr / f64::sqrt(330.0 * 40.0) - 1.0).abs() < 0.01, "{snr}");
@@ -268,7 +269,7 @@ fn the_photon_transfer_curve_gives_the_gain() {
 }
 
 #[test]
-fn rounding_adds_a_twelfth() {
+fn quantisation_adds_one_twelfth() {
     let n = draws();
     for sigma_dn in [0.5, 1.0, 3.0] {
         let params = CameraParams {
@@ -282,17 +283,17 @@ fn rounding_adds_a_twelfth() {
         camera.expose_window(&vec![1003.0; n], 1000, [0, 0], KEY, &mut codes);
         let codes: Vec<f64> = codes.into_iter().map(f64::from).collect();
         let (expected, z) = (sigma_dn * sigma_dn + 1.0 / 12.0, (2.0 / n as f64).sqrt());
-        // At half a grey level the rounding is not yet independent of the noise: 1 %.
+        // At a standard deviation of half a grey level, the rounding error still depends on the noise: 1 %.
         let error = variance(&codes) / expected - 1.0;
         assert!(error.abs() < 4.0 * z + if sigma_dn < 1.0 { 0.01 } else { 0.0 }, "{error}");
-        // The mean of what is rounded keeps up to exp(-2π²σ²)/π: 0.0023 at half a grey level.
+        // The mean of rounded values is off by up to exp(-2π²σ²)/π: 0.0023 at half a grey level.
         let bound = 0.0023 + 4.0 * (expected / n as f64).sqrt();
         assert!((mean(&codes) - 100.3).abs() < bound, "{}", mean(&codes));
     }
 }
 
 #[test]
-fn one_normal_deviate_has_the_summed_variance() {
+fn combined_normal_deviate_has_the_summed_variance() {
     let n = draws();
     let params = CameraParams {
         full_well_e: 1e5,
@@ -320,7 +321,7 @@ fn one_normal_deviate_has_the_summed_variance() {
 }
 
 #[test]
-fn levels_stay_in_range_and_saturation_is_counted() {
+fn levels_stay_in_range_and_saturated_pixels_are_counted() {
     let electrons = [0.0, 0.0, 9_000.0, 17_590.0, 18_500.0, 1e9];
     for (bit_depth, photon_noise) in (8..=16).zip(noises().into_iter().cycle()) {
         let params = CameraParams {
@@ -343,7 +344,7 @@ fn levels_stay_in_range_and_saturation_is_counted() {
 }
 
 #[test]
-fn a_full_pixel_holds_no_more() {
+fn charge_is_limited_to_the_full_well() {
     let params = CameraParams {
         full_well_e: 10_000.0,
         gain_dn_per_e: 0.01,
@@ -357,7 +358,7 @@ fn a_full_pixel_holds_no_more() {
 }
 
 #[test]
-fn noise_free_levels() {
+fn noise_free_levels_match_the_model() {
     let camera = Camera::new(&CameraParams::paper()).unwrap();
     assert!((camera.electrons_per_dn() - 70.0).abs() < 1e-12);
     assert_eq!(camera.max_dn(), 255);
@@ -378,7 +379,7 @@ fn noise_free_levels() {
     assert_eq!((codes, high), ([0, 0, 1, 2, 254, 255, 255], 2));
 }
 
-/// The same bytes on every machine, whatever its vector instructions.
+/// Pins the output bytes, independent of vector instructions.
 #[test]
 fn bits_are_pinned() {
     let electrons = scene(301, 57);

@@ -1,42 +1,42 @@
-//! Who gets an answer.
+//! Checks of the headers `Host` and `Origin`.
 
 use hyper::HeaderMap;
 use hyper::header::{HOST, HeaderValue, ORIGIN};
 
 use super::message::Reply;
 
-/// What a browser of this machine calls this server.
+/// Accepts requests that name this server, and rejects all others.
 #[derive(Debug)]
-pub(super) struct Gate {
+pub(super) struct OriginCheck {
     hosts: Vec<String>,
 }
 
-impl Gate {
+impl OriginCheck {
     pub(super) fn new(port: u16) -> Self {
-        /// The port that browsers leave out.
-        const UNSAID: u16 = 80;
+        /// The port that browsers omit.
+        const DEFAULT_PORT: u16 = 80;
         let names = ["127.0.0.1", "localhost"];
         let mut hosts: Vec<String> = names.iter().map(|name| format!("{name}:{port}")).collect();
-        if port == UNSAID {
+        if port == DEFAULT_PORT {
             hosts.extend(names.map(str::to_owned));
         }
         Self { hosts }
     }
 
-    /// What to say to who gets no answer.
-    pub(super) fn refuses(&self, headers: &HeaderMap) -> Option<Reply> {
-        // A page from elsewhere whose name was made to lead here calls this server by that name (DNS rebinding).
+    /// Returns the error reply for a request from another site, or nothing.
+    pub(super) fn rejects(&self, headers: &HeaderMap) -> Option<Reply> {
+        // DNS rebinding: a page of another site whose name resolves to this machine sends that name as its host.
         let mut hosts = headers.get_all(HOST).iter().map(HeaderValue::as_bytes);
         let (Some(host), None) = (hosts.next(), hosts.next()) else {
-            return Some(Reply::refusal(400, "one Host is expected"));
+            return Some(Reply::error(400, "expected one Host header"));
         };
         if !self.is_own(host) {
-            return Some(Reply::refusal(421, "this server answers to 127.0.0.1 and localhost alone"));
+            return Some(Reply::error(421, "expected the host 127.0.0.1 or localhost"));
         }
-        // A page from elsewhere that calls this server by its own name says where it comes from.
+        // Browsers send the origin of a page of another site.
         let own = |origin: &[u8]| self.is_own(origin.strip_prefix(b"http://").unwrap_or_default());
         let origin = headers.get(ORIGIN).map(HeaderValue::as_bytes);
-        origin.is_some_and(|origin| !own(origin)).then(|| Reply::refusal(403, "pages from elsewhere get no answer"))
+        origin.is_some_and(|origin| !own(origin)).then(|| Reply::error(403, "requests from pages of other sites are rejected"))
     }
 
     fn is_own(&self, host: &[u8]) -> bool {
@@ -51,8 +51,8 @@ mod tests {
     const OWN: &str = "127.0.0.1:8123";
 
     #[test]
-    fn hosts_and_origins_from_elsewhere_get_nothing() {
-        let gate = Gate::new(8123);
+    fn foreign_hosts_and_origins_are_rejected() {
+        let check = OriginCheck::new(8123);
         let headers = |hosts: &[&'static str], origin: Option<&'static str>| {
             let hosts = hosts.iter().map(|host| (HOST, HeaderValue::from_static(host)));
             let origin = origin.map(|origin| (ORIGIN, HeaderValue::from_static(origin)));
@@ -61,7 +61,7 @@ mod tests {
             map
         };
         let ask =
-            |hosts: &[&'static str], origin| gate.refuses(&headers(hosts, origin)).map_or(200, |reply| reply.status);
+            |hosts: &[&'static str], origin| check.rejects(&headers(hosts, origin)).map_or(200, |reply| reply.status);
         assert_eq!(ask(&["localhost:8123"], None), 200);
         assert_eq!(ask(&[OWN], Some("http://127.0.0.1:8123")), 200);
         for host in [
@@ -82,6 +82,6 @@ mod tests {
         {
             assert_eq!(ask(&[OWN], Some(origin)), 403, "{origin}");
         }
-        assert_eq!(Gate::new(80).refuses(&headers(&["localhost"], None)), None);
+        assert_eq!(OriginCheck::new(80).rejects(&headers(&["localhost"], None)), None);
     }
 }

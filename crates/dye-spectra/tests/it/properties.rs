@@ -1,4 +1,4 @@
-//! Laws of the light of stained slides, and a slow sum beside the fast ones.
+//! Tests of the light of stained slides: invariants, and fast routines against a slow sum.
 
 use dye_spectra::{
     Amounts, Colour, ColourParams, Curve, DYES, Dye, Error, Lamp, Mixing, Sensor, absorbance, amounts, encode_srgb,
@@ -7,8 +7,8 @@ use rand::RngExt;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 
-const LAMPS: [Lamp; 3] = [Lamp::Halogen { temperature_k: 3200.0 }, Lamp::Led, Lamp::Even];
-const SENSORS: [Sensor; 2] = [Sensor::Camera, Sensor::Even];
+const LAMPS: [Lamp; 3] = [Lamp::Halogen { temperature_k: 3200.0 }, Lamp::Led, Lamp::EqualEnergy];
+const SENSORS: [Sensor; 2] = [Sensor::Camera, Sensor::Panchromatic];
 const MIXINGS: [Mixing; 2] = [Mixing::Spectral, Mixing::ThreeVectors];
 
 fn colour(params: ColourParams) -> Colour {
@@ -19,7 +19,7 @@ fn default_colour() -> Colour {
     colour(ColourParams::default())
 }
 
-/// Every lamp, sensor and mixing.
+/// Iterates over every lamp, sensor and mixing model.
 fn all() -> impl Iterator<Item = Colour> {
     MIXINGS.into_iter().flat_map(all_of)
 }
@@ -31,7 +31,7 @@ fn all_of(mixing: Mixing) -> impl Iterator<Item = Colour> {
     params.map(colour)
 }
 
-/// Amounts of all dyes as in a Papanicolaou smear, from light to dark.
+/// Returns amounts of all dyes in a Papanicolaou smear, from light to dark.
 fn smears() -> Vec<Amounts> {
     let cytoplasms = [
         amounts([(Dye::LightGreen, 0.08), (Dye::EosinY, 0.03)]),
@@ -56,7 +56,7 @@ fn cosine(a: [f64; 3], b: [f64; 3]) -> f64 {
     dot(a, b) / (dot(a, a) * dot(b, b)).sqrt()
 }
 
-/// Planes of amounts, some of them with stretches of 0, and what three fresh channels get from `fill`.
+/// Returns random planes of amounts, partly 0.
 fn random_planes(pixels: usize, seed: u64) -> [Vec<f32>; DYES] {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     std::array::from_fn(|d| {
@@ -75,7 +75,7 @@ fn rows(colour: &Colour, planes: &[Vec<f32>; DYES]) -> [Vec<f32>; 3] {
     fill(planes[0].len(), |out| colour.transmittance_into(planes.each_ref().map(|plane| &plane[..]), out))
 }
 
-/// The light of a channel, written down as it is defined.
+/// Reference: the light of a channel by definition.
 fn oracle(colour: &Colour, mixing: Mixing, amounts: &Amounts) -> [f64; 3] {
     colour.channels().each_ref().map(|channel| {
         let mean = |f: &dyn Fn(f64) -> f64| channel.nodes.iter().map(|n| n.weight * f(n.wavelength_um)).sum::<f64>();
@@ -87,7 +87,7 @@ fn oracle(colour: &Colour, mixing: Mixing, amounts: &Amounts) -> [f64; 3] {
 }
 
 #[test]
-fn nothing_absorbs_nothing_and_light_never_exceeds_the_lamps() {
+fn light_without_dye_is_one_and_never_exceeds_one() {
     for colour in all() {
         for light in colour.transmittance(&[0.0; DYES]) {
             assert!((light - 1.0).abs() < 1e-15);
@@ -99,7 +99,7 @@ fn nothing_absorbs_nothing_and_light_never_exceeds_the_lamps() {
 }
 
 #[test]
-fn more_dye_never_gives_more_light() {
+fn light_decreases_with_dye() {
     let colour = default_colour();
     for dye in Dye::ALL {
         for smear in smears() {
@@ -111,7 +111,7 @@ fn more_dye_never_gives_more_light() {
 }
 
 #[test]
-fn overlaps_multiply_for_one_wavelength_for_three_vectors_and_for_neutral_dust() {
+fn overlaps_multiply_for_one_wavelength_three_vectors_and_neutral_dust() {
     let one = colour(ColourParams { wavelengths: 1, ..ColourParams::default() });
     let vectors = colour(ColourParams { mixing: Mixing::ThreeVectors, ..ColourParams::default() });
     let narrow = colour(ColourParams { from_um: 0.57, to_um: 0.570_001, ..ColourParams::default() });
@@ -129,9 +129,9 @@ fn overlaps_multiply_for_one_wavelength_for_three_vectors_and_for_neutral_dust()
     }
 }
 
-/// Published by G. Landini with ImageJ's Colour Deconvolution.
+/// Stain vectors published by G. Landini for ImageJ's Colour Deconvolution.
 #[test]
-fn stain_vectors_are_the_published_ones() {
+fn stain_vectors_match_published_values() {
     let published = [
         (Dye::Haematein, [0.650, 0.704, 0.286], 0.985),
         (Dye::Haematein, [0.644, 0.717, 0.267], 0.985),
@@ -154,7 +154,7 @@ fn sixteen_wavelengths_are_within_3e_3_of_151() {
     for lamp in LAMPS {
         let coarse = colour(ColourParams { lamp, ..ColourParams::default() });
         let fine = colour(ColourParams { lamp, wavelengths: 151, ..ColourParams::default() });
-        // Deeper than any dye lies in a smear.
+        // Darker than any dye in a smear.
         let alone = Dye::ALL.map(|dye| amounts([(dye, 0.9)]));
         for c in smears().into_iter().chain(alone) {
             let (coarse, fine) = (coarse.transmittance(&c), fine.transmittance(&c));
@@ -164,16 +164,16 @@ fn sixteen_wavelengths_are_within_3e_3_of_151() {
     }
 }
 
-/// The mean light of a channel through two slabs is not the product of their means: two cells that absorb in the same
-/// part of the channel let more through, two that absorb in different parts less.
+/// The product of the mean lights of two slabs is not the mean light through both. Two cells that absorb in the same
+/// part of the channel transmit more, two that absorb in different parts less.
 #[test]
-fn means_of_overlapping_slabs_do_not_multiply() {
+fn mean_light_of_overlapping_slabs_does_not_multiply() {
     let cyanophilic = amounts([(Dye::LightGreen, 0.15), (Dye::EosinY, 0.03)]);
     let eosinophilic = amounts([(Dye::EosinY, 0.2), (Dye::OrangeG, 0.05)]);
     let keratinised = amounts([(Dye::OrangeG, 0.45)]);
     let nucleus = amounts([(Dye::Haematein, 0.5), (Dye::EosinY, 0.01), (Dye::LightGreen, 0.02)]);
     let colour = default_colour();
-    // Error of the product relative to what both absorb, over the three channels.
+    // Error of the product relative to the absorbed light, over the three channels.
     let error = |a: &Amounts, b: &Amounts| {
         let (ta, tb, both) = (colour.transmittance(a), colour.transmittance(b), colour.transmittance(&sum(a, b)));
         let norm = |f: &dyn Fn(usize) -> f64| (0..3).map(|c| f(c) * f(c)).sum::<f64>().sqrt();
@@ -194,9 +194,9 @@ fn means_of_overlapping_slabs_do_not_multiply() {
     }
 }
 
-/// A camera's channel is so wide that twice the dye does not have twice the optical density.
+/// A camera channel is wide: twice the dye does not give twice the optical density.
 #[test]
-fn broad_channels_bend_the_law() {
+fn broad_channels_deviate_from_beer_lambert() {
     let colour = default_colour();
     let bend = |dye: Dye, channel: usize, amount: f64| {
         let density = |amount| -libm::log10(colour.transmittance(&amounts([(dye, amount)]))[channel]);
@@ -206,13 +206,13 @@ fn broad_channels_bend_the_law() {
         for amount in [0.5, 0.6, 0.75] {
             assert!(range.contains(&bend(dye, channel, amount)), "{dye:?} {amount}");
         }
-        // A thin stain does not bend it.
+        // Thin stains do not deviate.
         assert!(bend(dye, channel, 1e-4) > 0.999);
     }
 }
 
 #[test]
-fn channels_lie_where_their_light_is() {
+fn channels_describe_their_light() {
     for colour in all() {
         let [red, green, blue] = colour.channels();
         for channel in [red, green, blue] {
@@ -221,15 +221,16 @@ fn channels_lie_where_their_light_is() {
             let centroid: f64 = channel.nodes.iter().map(|n| n.weight * n.wavelength_um).sum();
             assert!((total - 1.0).abs() < 1e-12);
             assert!((centroid - channel.wavelength_um).abs() < 1e-3, "{centroid} {}", channel.wavelength_um);
-            assert!(channel.share > 0.0 && channel.share <= 1.0);
+            assert!(channel.relative_light > 0.0 && channel.relative_light <= 1.0);
             assert!(channel.bandwidth_um > 0.1 && channel.bandwidth_um < 0.3 + 1e-6, "{}", channel.bandwidth_um);
         }
     }
-    let even = colour(ColourParams { lamp: Lamp::Even, sensor: Sensor::Even, ..ColourParams::default() });
+    let even =
+        colour(ColourParams { lamp: Lamp::EqualEnergy, sensor: Sensor::Panchromatic, ..ColourParams::default() });
     for channel in even.channels() {
-        // The box itself.
+        // The rectangular band.
         assert!((channel.wavelength_um - 0.55).abs() < 1e-12 && (channel.bandwidth_um - 0.3).abs() < 1e-6);
-        assert_eq!(channel.share, 1.0);
+        assert_eq!(channel.relative_light, 1.0);
     }
     let [red, green, blue] = default_colour().channels().clone();
     assert!(red.wavelength_um > green.wavelength_um && green.wavelength_um > blue.wavelength_um);
@@ -238,16 +239,16 @@ fn channels_lie_where_their_light_is() {
 #[test]
 fn white_balance_makes_the_empty_slide_grey() {
     for colour in all() {
-        let shares = colour.channels().each_ref().map(|channel| channel.share);
-        assert_eq!(shares.into_iter().fold(0.0, f64::max), 1.0);
-        for (share, gain) in shares.into_iter().zip(colour.white_balance()) {
-            assert!((share * gain - 1.0).abs() < 1e-15 && gain >= 1.0);
+        let lights = colour.channels().each_ref().map(|channel| channel.relative_light);
+        assert_eq!(lights.into_iter().fold(0.0, f64::max), 1.0);
+        for (light, gain) in lights.into_iter().zip(colour.white_balance()) {
+            assert!((light * gain - 1.0).abs() < 1e-15 && gain >= 1.0);
         }
     }
 }
 
 #[test]
-fn sums_of_rows_are_the_sums_by_definition() {
+fn rows_match_the_definition() {
     let planes = random_planes(4099, 5);
     for (mixing, colour) in MIXINGS.into_iter().flat_map(|mixing| all_of(mixing).map(move |colour| (mixing, colour))) {
         let out = rows(&colour, &planes);
@@ -263,7 +264,7 @@ fn sums_of_rows_are_the_sums_by_definition() {
 }
 
 #[test]
-fn a_pixel_does_not_depend_on_its_neighbours() {
+fn pixels_are_independent() {
     let colour = default_colour();
     let curve = colour.curve(&amounts([(Dye::EosinY, 1.0), (Dye::OrangeG, 0.3)])).unwrap();
     let planes = random_planes(500, 6);
@@ -284,7 +285,7 @@ fn a_pixel_does_not_depend_on_its_neighbours() {
 }
 
 #[test]
-fn empty_planes_and_zeros_are_the_same_and_leave_light_alone() {
+fn empty_planes_equal_zeros_and_transmit_all_light() {
     for colour in all() {
         let planes = random_planes(100, 7);
         let zeros = vec![0.0; 100];
@@ -307,7 +308,7 @@ fn empty_planes_and_zeros_are_the_same_and_leave_light_alone() {
 }
 
 #[test]
-fn opaque_pixels_are_dark_and_nothing_is_undefined() {
+fn opaque_pixels_are_dark_and_finite() {
     let colour = default_colour();
     for amount in [50.0, 1e6, f32::MAX, f32::INFINITY] {
         let soot = [amount; 40];
@@ -320,7 +321,7 @@ fn opaque_pixels_are_dark_and_nothing_is_undefined() {
 }
 
 #[test]
-fn curves_are_the_sums_they_replace() {
+fn curves_match_the_sums() {
     let amount: Vec<f32> = (0..6000).map(|i| i as f32 * 1e-3).collect();
     let alone = Dye::ALL.map(|dye| amounts([(dye, 1.0)]));
     let weak = smears().into_iter().map(|smear| smear.map(|amount| amount * 0.1));
@@ -329,7 +330,7 @@ fn curves_are_the_sums_they_replace() {
             let curve = colour.curve(&mix).unwrap();
             let out = fill(amount.len(), |out| curve.transmittance_into(&amount, out));
             for (i, amount) in amount.iter().enumerate() {
-                let exact = colour.transmittance(&mix.map(|share| share * f64::from(*amount)));
+                let exact = colour.transmittance(&mix.map(|amount_of_dye| amount_of_dye * f64::from(*amount)));
                 for c in 0..3 {
                     assert!((f64::from(out[c][i]) - exact[c]).abs() < 1e-5, "{mix:?} {amount} {c}: {}", out[c][i]);
                 }
@@ -339,24 +340,24 @@ fn curves_are_the_sums_they_replace() {
 }
 
 #[test]
-fn wrong_mixtures_are_refused_by_name() {
+fn invalid_mixtures_are_rejected_by_name() {
     let colour = default_colour();
     for (value, shown) in [(f64::NAN, "NaN"), (-0.5, "-0.5"), (f64::INFINITY, "inf"), (1e4, "10000")] {
-        let refused: Result<Curve, Error> = colour.curve(&[0.0, value, 0.0, 0.0, 0.0]);
-        assert_eq!(refused.unwrap_err().to_string(), format!("mix is {shown}; it must be from 0 to 1000"));
+        let rejected: Result<Curve, Error> = colour.curve(&[0.0, value, 0.0, 0.0, 0.0]);
+        assert_eq!(rejected.unwrap_err().to_string(), format!("mix is {shown}; it must be from 0 to 1000"));
     }
     assert!(Colour::new(&ColourParams { wavelengths: 0, ..ColourParams::default() }).is_err());
 }
 
 #[test]
-#[should_panic(expected = "a plane of amounts is not as long as the channels")]
-fn planes_of_other_lengths_are_refused() {
+#[should_panic(expected = "planes of amounts must be empty or as long as the channels")]
+fn planes_of_other_lengths_panic() {
     let planes = [&[0.0; 8][..], &[0.0; 7], &[], &[], &[]];
     fill(8, |out| default_colour().transmittance_into(planes, out));
 }
 
 #[test]
-fn one_wavelength_is_one_wavelength() {
+fn single_wavelength_matches_beer_lambert() {
     let single = colour(ColourParams { from_um: 0.565, to_um: 0.575, wavelengths: 1, ..ColourParams::default() });
     for smear in smears() {
         let exact = libm::exp10(-absorbance(&smear, 0.57));
@@ -365,7 +366,7 @@ fn one_wavelength_is_one_wavelength() {
 }
 
 #[test]
-fn screens_get_white_as_white_and_dyes_as_the_eye_has_them() {
+fn display_colours_of_white_and_dyes_are_plausible() {
     for colour in all() {
         for row in colour.to_srgb() {
             assert!((row.iter().sum::<f64>() - 1.0).abs() < 1e-12);
@@ -384,16 +385,16 @@ fn screens_get_white_as_white_and_dyes_as_the_eye_has_them() {
     assert!(r > g && g > b, "orange: {r} {g} {b}");
     let [r, g, b] = screen(amounts([(Dye::Haematein, 0.5)]));
     assert!(b > r && b > g, "blue-violet: {r} {g} {b}");
-    // A camera without colours is left as it is.
-    let grey = colour(ColourParams { sensor: Sensor::Even, ..ColourParams::default() });
+    // A monochrome camera needs no conversion.
+    let grey = colour(ColourParams { sensor: Sensor::Panchromatic, ..ColourParams::default() });
     for (i, row) in grey.to_srgb().iter().enumerate() {
         assert!((row[i] - 1.0).abs() < 1e-9, "{row:?}");
     }
 }
 
 #[test]
-fn screen_values_follow_the_standard() {
-    // IEC 61966-2-1: a linear part, then a power.
+fn srgb_encoding_follows_the_standard() {
+    // IEC 61966-2-1: a linear section, then a power function.
     let cases = [(0.0, 0), (1.0, 255), (0.003_130_8, 10), (0.215_860_5, 128), (0.5, 188), (-3.0, 0), (7.0, 255)];
     for (linear, encoded) in cases {
         assert_eq!(encode_srgb(linear), encoded, "{linear}");

@@ -1,4 +1,4 @@
-//! What every field obeys, whatever its spectrum.
+//! Statistical properties of fields, for every spectrum.
 
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use rustfft::{FftPlanner, num_complex::Complex64};
@@ -20,7 +20,7 @@ fn periodic(width: usize, height: usize, spectrum: Spectrum) -> SpectralField {
     SpectralField::new(&FieldParams { width, height, spectrum, padding: Padding::Periodic }).unwrap()
 }
 
-/// Mean over pixels of field(x) · field(x + lag), wrapped.
+/// Returns the mean over pixels of field(x) · field(x + lag), periodic.
 fn product(field: &[f32], width: usize, [dx, dy]: [usize; 2]) -> f64 {
     let height = field.len() / width;
     let mut sum = 0.0;
@@ -33,7 +33,7 @@ fn product(field: &[f32], width: usize, [dx, dy]: [usize; 2]) -> f64 {
     sum / field.len() as f64
 }
 
-/// Mean and standard error of one number per draw.
+/// Returns mean and standard error of one number per draw.
 fn statistics(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
@@ -63,21 +63,21 @@ fn mean_is_zero_and_variance_one() {
 }
 
 #[test]
-fn autocorrelation_is_the_analytic_one() {
+fn autocorrelation_matches_the_analytic_one() {
     for spectrum in [matern(0.5, 2.0), matern(1.0, 4.0), matern(2.3, 1.5), matern(0.2, 3.0), GAUSSIAN] {
         let field = periodic(128, 96, spectrum);
         for lag in [[0.0_f64, 0.0], [1.0, 0.0], [0.0, 2.0], [3.0, 3.0], [0.0, 7.0], [12.0, 5.0]] {
             let distance = (lag[0] * lag[0] + lag[1] * lag[1]).sqrt();
             let analytic = spectrum.autocorrelation(distance).unwrap();
             let planned = field.autocorrelation(lag);
-            // The alias orders left out; the wrapped tail is below it.
+            // The error of omitted alias orders; the periodic tail is smaller.
             assert!((planned - analytic).abs() < 2e-3, "{spectrum:?} {lag:?}: {planned}, {analytic}");
         }
     }
 }
 
 #[test]
-fn drawn_fields_have_the_planned_autocorrelation() {
+fn drawn_fields_have_the_expected_autocorrelation() {
     for (width, height) in [(48, 30), (45, 31)] {
         for spectrum in [matern(0.5, 2.0), Spectrum::BROWNIAN] {
             let field = periodic(width, height, spectrum);
@@ -95,8 +95,8 @@ fn drawn_fields_have_the_planned_autocorrelation() {
 }
 
 #[test]
-fn half_turns_and_mirrors_are_equally_likely() {
-    // An error of sign in the packing of rows would favour one diagonal.
+fn both_diagonals_are_equally_likely() {
+    // A sign error in the packing of rows would favour one diagonal.
     let field = periodic(32, 32, matern(1.0, 3.0));
     let mut rng = rng();
     let difference: Vec<_> =
@@ -155,7 +155,7 @@ fn brownian_power_falls_with_the_square_of_frequency() {
 }
 
 #[test]
-fn periodic_fields_tile_and_padded_ones_do_not() {
+fn periodic_fields_tile_but_padded_fields_do_not() {
     const SIDE: usize = 120;
     let spectrum = Spectrum::Gaussian { sigma_px: 6.0 };
     let seam = |padding| {
@@ -180,7 +180,7 @@ fn periodic_fields_tile_and_padded_ones_do_not() {
 }
 
 #[test]
-fn draw_into_overwrites_with_the_same_bits() {
+fn draw_into_matches_draw_bit_for_bit() {
     for (width, height) in [(1, 1), (1, 9), (9, 1), (2, 3), (37, 29), (64, 17)] {
         for padding in [Padding::Periodic, Padding::Margin { px: 3 }] {
             let field =
@@ -195,12 +195,12 @@ fn draw_into_overwrites_with_the_same_bits() {
 }
 
 #[test]
-fn draws_have_these_bits_everywhere() {
+fn bits_are_pinned() {
     let mut sums = Vec::new();
     for spectrum in [Spectrum::BROWNIAN, matern(1.0, 4.0), GAUSSIAN] {
         let params = FieldParams { width: 75, height: 53, spectrum, ..FieldParams::default() };
         let field = SpectralField::new(&params).unwrap().draw(&mut rng());
-        // A hash of Fowler, Noll and Vo.
+        // Fowler–Noll–Vo hash.
         sums.push(field.iter().fold(0xcbf2_9ce4_8422_2325, |hash: u64, v| {
             (hash ^ u64::from(v.to_bits())).wrapping_mul(0x0100_0000_01b3)
         }));
@@ -210,18 +210,18 @@ fn draws_have_these_bits_everywhere() {
 
 #[test]
 #[should_panic(expected = "8 x 4 elements")]
-fn a_wrong_length_is_named() {
+fn wrong_length_panics() {
     periodic(8, 4, GAUSSIAN).draw_into(&mut [0.0; 31], &mut rng());
 }
 
-/// The residual of a least-squares fit of all monomials x^i y^j up to third degree.
+/// Subtracts a least-squares fit of all monomials x^i y^j up to third degree.
 fn detrend(values: &mut [f64], at: &[[f64; 2]]) {
     let mut basis: Vec<Vec<f64>> = Vec::new();
     for (i, j) in (0..4).flat_map(|i| (0..4 - i).map(move |j| (i, j))) {
         let power = |v: f64, p: usize| (0..p).fold(1.0, |m, _| m * v);
         let mut term: Vec<_> = at.iter().map(|p| power(p[0], i) * power(p[1], j)).collect();
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        // Gram and Schmidt, twice for accuracy.
+        // Gram–Schmidt, twice for accuracy.
         for _ in 0..2 {
             for earlier in &basis {
                 let along = dot(earlier, &term);
@@ -236,11 +236,11 @@ fn detrend(values: &mut [f64], at: &[[f64; 2]]) {
     }
 }
 
-/// Detrended autocorrelation of normal nuclei at 1 to 6 px of 0.25 µm, measured on 100 of them,
-/// against a Matérn field of ν = 1, l = 0.5 µm on a grid of 0.125 µm, summed into pixels and cut
-/// to a disc of the nuclei's mean diameter, 7.96 µm. No optics in between.
+/// Compares the detrended autocorrelation of 100 normal nuclei, at 1 to 6 px of 0.25 µm, with a Matérn field of ν = 1,
+/// l = 0.5 µm. The field has a grid of 0.125 µm, is averaged to pixels and cut to a disc of the nuclei's mean diameter,
+/// 7.96 µm, without optics.
 #[test]
-fn matern_field_looks_like_chromatin() {
+fn matern_field_matches_chromatin() {
     const MEASURED: [f64; 6] = [0.715, 0.373, 0.137, -0.013, -0.082, -0.104];
     const SIDE: usize = 40;
     const RADIUS: f64 = 15.9;

@@ -1,4 +1,4 @@
-//! What one object lets through of each channel's light, and how late, on its own rectangle of the slide's grid.
+//! Transmittance and phase delay of one object for each channel, on a rectangle of the slide's grid.
 
 use dye_spectra::{Amounts, Colour, DYES};
 use multiversion::multiversion;
@@ -6,11 +6,11 @@ use optics_psf::{Gaussian, Scratch};
 use portable_numerics::elementary::exp10_from;
 
 use crate::phantom::piece::{Phantom, Piece};
-use crate::phantom::tile::{Tile, lay};
+use crate::phantom::tile::{Tile, overlay};
 use crate::truth::{COVERED, Part};
 
-/// How dyes become absorbance.
-pub(super) enum Mixer {
+/// The conversion of dye amounts to absorbance.
+pub(super) enum DyeMixer {
     /// At one wavelength, µm.
     Monochrome(f64),
     /// Over the bands of three channels.
@@ -25,19 +25,21 @@ pub(super) struct Window {
     pub(super) height: usize,
 }
 
+/// Transmittance and phase delay of one object on a [`Window`].
 #[derive(Debug, Default)]
-pub(super) struct Canvas {
-    /// Light that comes through, 0 to 1, channel by channel.
+pub(super) struct ObjectTransmission {
+    /// Transmittance, 0 to 1, for each channel.
     pub(super) transmittance: Vec<Vec<f32>>,
-    /// How late it comes, radians; empty if it does not.
+    /// Phase delay, radians; empty if the object does not refract.
     pub(super) phase_rad: Vec<f32>,
-    /// Absorbance, or the amounts of dyes, on the way there.
+    /// Buffers for the absorbance or the amounts of dyes.
     amounts: [Vec<f32>; DYES],
     zeros: Vec<f32>,
 }
 
 impl Window {
-    /// The smallest rectangle of whole pixels, of `n` grid points a side, that holds the tiles; nothing if there are none.
+    /// Returns the smallest rectangle of complete pixels (`n` x `n` grid points) around the tiles; `None` without
+    /// tiles.
     pub(super) fn around<'a>(tiles: impl Iterator<Item = &'a Tile>, n: usize) -> Option<Self> {
         let n = n as i64;
         let (mut low, mut high) = ([i64::MAX; 2], [i64::MIN; 2]);
@@ -51,17 +53,17 @@ impl Window {
         Some(Self { origin: low, width: side(0)?, height: side(1)? })
     }
 
-    /// Whether it has a point in a grid of that size, or within a margin of it.
+    /// Whether the rectangle intersects a grid of this size extended by a margin.
     pub(super) fn meets(self, width: usize, height: usize, margin: usize) -> bool {
         let margin = margin as i64;
-        let inside = |axis: usize, length: usize, whole: usize| {
-            self.origin[axis] - margin < whole as i64 && self.origin[axis] + length as i64 + margin > 0
+        let inside = |axis: usize, length: usize, size: usize| {
+            self.origin[axis] - margin < size as i64 && self.origin[axis] + length as i64 + margin > 0
         };
         inside(0, self.width, width) && inside(1, self.height, height)
     }
 }
 
-impl Mixer {
+impl DyeMixer {
     pub(super) fn channels(&self) -> usize {
         match self {
             Self::Monochrome(_) => 1,
@@ -69,7 +71,7 @@ impl Mixer {
         }
     }
 
-    /// Absorbance of dyes in the middle of a channel's band.
+    /// Returns the absorbance of dyes at the centre wavelength of a channel.
     fn absorbance(&self, dyes: &Amounts, channel: usize) -> f64 {
         let wavelength = match self {
             Self::Monochrome(wavelength) => *wavelength,
@@ -78,36 +80,40 @@ impl Mixer {
         dye_spectra::absorbance(dyes, wavelength)
     }
 
-    /// The share that each piece has, over what it covers, in what the whole object absorbs of each channel's light.
-    pub(super) fn shares(&self, phantom: &Phantom) -> Vec<Vec<f64>> {
+    /// Returns, for each channel and piece, the fraction of the object's absorbance that the piece contributes where it
+    /// covers.
+    pub(super) fn fractions(&self, phantom: &Phantom) -> Vec<Vec<f64>> {
         let pieces = &phantom.pieces;
-        // Sums of what each piece absorbs where one of them covers.
+        // Sums of the absorbance of each piece over the area of one piece.
         let within = |piece: &Piece| -> Vec<f64> {
-            pieces.iter().map(|other| other.absorbance.sum_where(&piece.coverage, piece.cover_step, COVERED)).collect()
+            pieces
+                .iter()
+                .map(|other| other.absorbance.sum_where(&piece.coverage, piece.coverage_step, COVERED))
+                .collect()
         };
-        // What has no parts is all of it, whatever stains it.
+        // An object without parts contributes its complete absorbance.
         let is_all = |piece: &Piece| pieces.len() == 1 || piece.part == Part::Whole;
         let sums: Vec<Vec<f64>> =
             pieces.iter().map(|piece| if is_all(piece) { Vec::new() } else { within(piece) }).collect();
-        let share = |own: usize, strengths: &[f64]| {
-            let whole: f64 = sums[own].iter().zip(strengths).map(|(sum, strength)| sum * strength).sum();
+        let fraction = |own: usize, strengths: &[f64]| {
+            let total: f64 = sums[own].iter().zip(strengths).map(|(sum, strength)| sum * strength).sum();
             match sums[own].get(own) {
                 None => 1.0,
-                Some(sum) if whole > 0.0 => sum * strengths[own] / whole,
+                Some(sum) if total > 0.0 => sum * strengths[own] / total,
                 Some(_) => 0.0,
             }
         };
         let of_channel = |channel: usize| {
             let strengths: Vec<f64> = pieces.iter().map(|piece| self.absorbance(&piece.dyes, channel)).collect();
-            (0..pieces.len()).map(|own| share(own, &strengths)).collect()
+            (0..pieces.len()).map(|own| fraction(own, &strengths)).collect()
         };
         (0..self.channels()).map(of_channel).collect()
     }
 
-    /// Lets light through the pieces of an object.
-    pub(super) fn compose(&self, pieces: &[Piece], window: Window, canvas: &mut Canvas) {
+    /// Computes the transmittance and phase delay of the pieces of an object.
+    pub(super) fn compose(&self, pieces: &[Piece], window: Window, transmission: &mut ObjectTransmission) {
         let samples = window.width * window.height;
-        let Canvas { transmittance, phase_rad, amounts, zeros } = canvas;
+        let ObjectTransmission { transmittance, phase_rad, amounts, zeros } = transmission;
         transmittance.resize(self.channels(), Vec::new());
         match self {
             Self::Monochrome(wavelength) => {
@@ -125,7 +131,7 @@ impl Mixer {
             Self::Colour(colour) => {
                 for (dye, amount) in amounts.iter_mut().enumerate() {
                     amount.clear();
-                    // A dye that is nowhere needs no plane.
+                    // A dye without amounts needs no plane.
                     if pieces.iter().any(|piece| piece.dyes[dye] > 0.0) {
                         amount.resize(samples, 0.0);
                     }
@@ -156,19 +162,19 @@ pub(super) fn clear(values: &mut Vec<f32>, samples: usize) {
     values.resize(samples, 0.0);
 }
 
-/// Adds a tile, so many times as strong, to a rectangle.
+/// Adds `strength` times a tile to a rectangle.
 #[multiversion(targets = "simd")]
 pub(super) fn add(values: &mut [f32], window: Window, tile: &Tile, strength: f32) {
-    lay(values, window.width, window.origin, tile, |row, tile| {
+    overlay(values, window.width, window.origin, tile, |row, tile| {
         row.iter_mut().zip(tile).for_each(|(value, tile)| *value += strength * tile);
     });
 }
 
-/// A tile that is blurred and as much larger, in memory of another one.
-pub(super) fn blurred(tile: &Tile, gaussian: &Gaussian, mut values: Vec<f32>, scratch: &mut Scratch) -> Tile {
+/// Returns a blurred tile, enlarged by the blur radius; `values` is a buffer for it.
+pub(super) fn blurred_tile(tile: &Tile, gaussian: &Gaussian, mut values: Vec<f32>, scratch: &mut Scratch) -> Tile {
     let margin = gaussian.radius();
     let width = tile.width + 2 * margin;
     values.resize(width * (tile.height() + 2 * margin), 0.0);
-    gaussian.spread_into(&tile.values, tile.width, &mut values, scratch);
+    gaussian.blur_expanded_into(&tile.values, tile.width, &mut values, scratch);
     Tile { origin: tile.origin.map(|at| at - margin as i64), width, values }
 }
