@@ -12,7 +12,7 @@ use anyhow::{Context, Error, Result, anyhow, ensure};
 #[error("{0}")]
 pub(crate) struct Skipped(String);
 
-/// Returns [`Skipped`], or a failure if `CI` is set, where nobody would read the message.
+/// Returns [`Skipped`], or a failure if `CI` is set, where a message would be overlooked.
 pub(crate) fn skipped(reason: impl Into<String>) -> Error {
     let reason = reason.into();
     let in_ci = std::env::var("CI").is_ok_and(|value| !matches!(value.as_str(), "" | "0" | "false"));

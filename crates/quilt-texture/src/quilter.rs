@@ -148,8 +148,8 @@ impl<'a> Quilter<'a> {
         }
     }
 
-    /// Applies the paper's acceptance: returns the first random candidate with d(E_B(x,y), E_B0) < d_max, where d is the
-    /// root mean square error of the overlaps.
+    /// Applies the paper's acceptance: returns the first random candidate with d(E_B(x,y), E_B0) < d_max, where d is
+    /// the root mean square error of the overlaps.
     fn first_below<R: Rng + ?Sized>(
         &self,
         d_max: f64,

@@ -254,7 +254,7 @@ impl Kernels {
         let child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
         let mut child = child.with_context(|| format!("cannot start {}", command.get_program().display()))?;
         let (asked, answers) = (child.stdin.take(), child.stdout.take());
-        Ok(Self { child, asked, answers: BufReader::new(answers.context("its output is ours")?) })
+        Ok(Self { child, asked, answers: BufReader::new(answers.context("the output is piped")?) })
     }
 
     /// Runs a kernel for about `seconds` and returns the CPU seconds of each repetition, or the reason why it is not

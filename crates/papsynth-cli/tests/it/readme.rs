@@ -15,7 +15,7 @@ use tiff::encoder::{TiffEncoder, colortype};
 use crate::calibrate::{SIDE, bright_field, nucleus};
 use crate::support::{Bench, outlines};
 
-/// A field that is rendered in a moment, whatever the preset.
+/// A small field, for any preset.
 const FIELD: &str = "--set field.width_px=160 --set field.height_px=120 --set layout.kind=uniform \
     --set slide.spacing_um=1 --set cells.intermediate.count=2 --set cells.superficial.count=0 \
     --set cells.parabasal.count=0 --set cells.metaplastic.count=0 --set debris.leukocytes.clusters=1 \
@@ -29,8 +29,8 @@ const NUCLEI: &str = "--set field.width_px=210 --set field.height_px=160 --set f
 /// A slide whose deposit lies near the first corner.
 const SLIDE: &str = "--set scan.frame_px=256 --set scan.deposit.x_um=80 --set scan.deposit.y_um=80";
 
-/// Makes a command run for a moment: values of options that are replaced, and options that are inserted. What a command
-/// sets itself wins.
+/// Changes that reduce the time of a command: values of options to replace, and options to insert before those of the
+/// command.
 struct Smaller {
     /// First words of the command, after `papsynth`.
     command: &'static str,
