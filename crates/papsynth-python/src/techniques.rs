@@ -233,7 +233,7 @@ fn grow<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let outline = outline_of(&outline)?;
     drawn(py, shape, |out| -> Result<(), voronoi_cytoskeleton::Error> {
-        let params = voronoi_cytoskeleton::SkeletonParams { rivers, ..Default::default() };
+        let params = voronoi_cytoskeleton::SkeletonParams { paths: rivers, ..Default::default() };
         let rivers = voronoi_cytoskeleton::Skeleton::new(&params)?.grow(&outline, &mut random(seed))?;
         let lines = voronoi_cytoskeleton::LineParams { width_px, ..Default::default() };
         voronoi_cytoskeleton::draw_into(out, shape.1, &rivers, &lines)

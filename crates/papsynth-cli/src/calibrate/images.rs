@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 
 use ccd_noise::Error::{NoDark, Saturated};
 use optics_psf::Error::FocusAtStackEnd;
-use papsynth_calibrate::{Camera, Edge, EdgeAt, Error, Flats, Focus, FocusParams, Frame, Instrument, LightLevel, NucleiAt};
+use papsynth_calibrate::{
+    Camera, Edge, EdgeAt, Error, Flats, Focus, FocusParams, Frame, Instrument, LightLevel, NucleiAt,
+};
 use papsynth_dataset::read::{GreyImage, Limits, Stack, image_files, natural_order};
 
 use crate::args::Calibrate;
@@ -139,7 +141,8 @@ fn exposures(folder: &Path, dark: Option<&Path>) -> Result<Vec<Exposure>, ExitEr
             ));
         }
     };
-    let mut exposures = vec![Exposure { name: dark.display().to_string(), files: files(&dark)?, light: LightLevel::Dark }];
+    let mut exposures =
+        vec![Exposure { name: dark.display().to_string(), files: files(&dark)?, light: LightLevel::Dark }];
     for path in &folders {
         exposures.push(Exposure { name: path.display().to_string(), files: files(path)?, light: LightLevel::Unknown });
     }
