@@ -168,7 +168,7 @@ fn patch_number(trial: usize, slot: usize) -> usize {
 
 impl FieldRecord {
     /// Returns the field as shown, before noise.
-    fn write_image(&self, params: &StudyParams, folders: &Folders) -> Result<GreyImage, Error> {
+    fn shown_image(&self, params: &StudyParams, folders: &Folders) -> Result<GreyImage, Error> {
         let field = folders.fields[self.side as usize].iter().find(|field| field.name == self.name);
         let raw = Raw::read(field.ok_or_else(|| self.changed(folders))?)?;
         if hex(&Sha256::digest(&raw.bytes)) != self.sha256 {

@@ -223,7 +223,11 @@ mod tests {
             (at("body/tint"), "green".into(), "unknown variant `green`"),
             (at("body/kind"), "dragon".into(), "unknown variant `dragon`"),
             (at("body/dyes"), Value::from(vec![1.0]), "invalid length 1"),
-            (at("body/detail/notches"), 1e9.into(), "body.detail.notches: 1000000000 is out of range: expected 0 to 100"),
+            (
+                at("body/detail/notches"),
+                1e9.into(),
+                "body.detail.notches: 1000000000 is out of range: expected 0 to 100",
+            ),
             (at("id"), 0.into(), "id: 0 is out of range: expected 1"),
         ] {
             let message = refused(&pointer, to);
