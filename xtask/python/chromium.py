@@ -1,6 +1,6 @@
-"""A browser and a program that serves a page to it, for tests that act as a person does.
+"""A browser, and a program that serves a page, for tests with keyboard and mouse.
 
-Chromium is spoken to through a pipe (--remote-debugging-pipe), so that Python's own library is enough.
+Controls Chromium through a pipe (--remote-debugging-pipe), which only needs the standard library.
 """
 
 import base64
@@ -22,7 +22,7 @@ FLAGS = [
 
 
 class Served:
-    """The program, serving a page."""
+    """The program that serves a page."""
 
     def __init__(self, program, words):
         self.process = subprocess.Popen(
@@ -36,20 +36,20 @@ class Served:
         raise SystemExit(f"the program ended: {self.process.stderr.read()}")
 
     def interrupt(self):
-        """Ends it as Ctrl-C does: its exit code and what it printed."""
+        """End it like Ctrl-C. Return its exit code and output."""
         self.process.send_signal(signal.SIGINT)
         out, _ = self.process.communicate(timeout=PATIENCE_S)
         return self.process.returncode, out
 
 
 class Browser:
-    """Chromium and one page of it."""
+    """Chromium with one page."""
 
     def __init__(self, chromium):
         self.profile = tempfile.mkdtemp()
         theirs_in, ours_out = os.pipe()
         ours_in, theirs_out = os.pipe()
-        # It reads commands from descriptor 3 and writes to 4.
+        # Chromium reads commands from descriptor 3 and writes to 4.
         shell = f'exec "$@" 3<&{theirs_in} 4>&{theirs_out}'
         self.process = subprocess.Popen(
             ["sh", "-c", shell, "sh", chromium, *FLAGS, f"--user-data-dir={self.profile}", "about:blank"],
@@ -93,7 +93,7 @@ class Browser:
         try:
             outcome = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
         except RuntimeError:
-            return None  # The page is being loaded.
+            return None  # The page is loading.
         assert "exceptionDetails" not in outcome, outcome
         return outcome["result"].get("value")
 
@@ -122,7 +122,7 @@ class Browser:
         self.call("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=turn, modifiers=8 if shift else 0)
 
     def drag(self, start, end):
-        """With the left button from a point of the page to another."""
+        """Drag with the left button from a point of the page to another."""
         self.call("Input.dispatchMouseEvent", type="mousePressed", x=start[0], y=start[1], button="left", clickCount=1)
         for part in (0.25, 0.5, 0.75, 1):
             x, y = (a + part * (b - a) for a, b in zip(start, end))
@@ -136,7 +136,7 @@ class Browser:
         self.call("Page.navigate", url=address)
 
     def collect(self):
-        """Keeps what was received since the last time: a page that is loaded anew forgets it."""
+        """Collect the responses since the last call, because a reloaded page discards them."""
         events = {e["method"]: [] for e in self.events}
         for event in self.events:
             events[event["method"]].append(event["params"])
@@ -148,7 +148,7 @@ class Browser:
             try:
                 body = self.call("Network.getResponseBody", requestId=event["requestId"])
             except RuntimeError:
-                continue  # Forgotten already.
+                continue  # Already discarded.
             raw = base64.b64decode(body["body"]) if body["base64Encoded"] else body["body"].encode()
             self.received.append((event["response"]["url"], event["response"]["mimeType"], raw))
 
@@ -159,7 +159,7 @@ class Browser:
         errors = [e["params"] for e in self.events if e["method"] == "Runtime.exceptionThrown"]
         return errors + [
             e["params"]["entry"] for e in self.events
-            # While the program is away, nobody answers.
+            # The program may be restarting.
             if e["method"] == "Log.entryAdded" and "ERR_CONNECTION" not in e["params"]["entry"]["text"]
             and "ERR_EMPTY_RESPONSE" not in e["params"]["entry"]["text"]
         ]

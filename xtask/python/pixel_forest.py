@@ -1,10 +1,10 @@
-"""How well a pixel forest that was trained on synthetic fields finds the nuclei of a real one.
+"""Trains a random forest on pixels of synthetic fields, and segments the nuclei of a real field.
 
     pixel_forest.py SYNTHETIC IMAGE MASK [--fields 20]
 
-SYNTHETIC is a data set of `papsynth generate`; IMAGE a real field, MASK its nuclei. A forest of 100 trees learns from Gaussian, Hessian and
-Sobel features at sigma 1 to 8 which pixels of the first fields lie in nuclei; the threshold of its probability is the one with the
-best Dice coefficient on fields of the data set that it has not seen. Prints one line of JSON.
+SYNTHETIC is a data set of `papsynth generate`; IMAGE a real field, MASK its nuclei. A forest of 100 trees classifies pixels of the first fields by Gaussian,
+Hessian and Sobel features at sigma 1 to 8. The probability threshold is the one with the best Dice coefficient on the other fields of the
+data set. Prints one line of JSON.
 """
 
 import argparse
@@ -23,7 +23,7 @@ SEED = 0
 
 
 def features(grey):
-    """Features of every pixel: absorbance over the background, blurred, its edges, its Hessian's eigenvalues."""
+    """Return the features of every pixel: absorbance relative to the background, blurred, gradients, eigenvalues of the Hessian."""
     background = max(np.percentile(grey, 95), 1.0)
     image = -np.log10(np.clip(grey, 1.0, None) / background).astype(np.float32)
     columns = [image]
@@ -38,7 +38,7 @@ def features(grey):
 
 
 def synthetic(folder, index):
-    """A field of a data set and the mask of its nuclei."""
+    """Return a field of a data set and the mask of its nuclei."""
     grey = np.asarray(Image.open(folder / "images" / f"{index:06}.png").convert("L"), dtype=np.float32)
     coco = json.loads((folder / "frames" / f"{index:06}.coco.json").read_text())
     names = {category["id"]: category["name"] for category in coco["categories"]}
@@ -50,7 +50,7 @@ def synthetic(folder, index):
 
 
 def dice(found, true):
-    """The Dice coefficient of two masks."""
+    """Return the Dice coefficient of two masks."""
     return float(2 * np.sum(found & true) / max(np.sum(found) + np.sum(true), 1))
 
 

@@ -1,4 +1,4 @@
-//! Benches of the techniques and of the engine.
+//! Benchmarks of the techniques and of the engine.
 
 pub(crate) mod counts;
 
@@ -11,29 +11,29 @@ use clap::{Args, Subcommand};
 use crate::workspace::Workspace;
 use crate::{peers, shell};
 
-/// Runs the benches of all crates, counts instructions, or races against good programs of others
+/// Runs the benchmarks of all crates, counts instructions, or compares with other programs
 #[derive(Args)]
 #[command(args_conflicts_with_subcommands = true)]
 pub(crate) struct Bench {
     #[command(subcommand)]
     instead: Option<Instead>,
-    /// Keeps the figures under a name
+    /// Saves the results under a name
     #[arg(long, value_name = "NAME")]
     save: Option<String>,
-    /// Compares with the figures under a name
+    /// Compares with the results saved under a name
     #[arg(long, value_name = "NAME")]
     against: Option<String>,
-    /// Picks benches by name, and whatever else criterion takes
+    /// Part of the names of the benchmarks to run, and other arguments of criterion
     #[arg(value_name = "FILTER", allow_hyphen_values = true)]
     filter: Vec<String>,
 }
 
 #[derive(Subcommand)]
 enum Instead {
-    /// Counts the instructions of small works under valgrind, and fails where one takes 2 % more than benches/counts.json keeps for this
-    /// compiler
+    /// Counts the instructions of small kernels with valgrind, and fails if one takes 2 % more than in
+    /// benches/counts.json for this compiler
     Counts {
-        /// Writes that file
+        /// Replaces the counts
         #[arg(long)]
         bless: bool,
     },
@@ -46,7 +46,7 @@ pub(crate) fn run(workspace: &Workspace, arguments: Bench) -> Result<()> {
         Some(Instead::Peers(peers)) => return peers::run(workspace, &peers),
         None => {}
     }
-    // Named one by one, since the test harness of a library does not know criterion's arguments.
+    // Named one by one, because the test harness of a library does not accept arguments of criterion.
     let targets = workspace.packages.iter().flat_map(|package| &package.targets);
     let benches = targets.filter(|target| target.kind.iter().any(|kind| kind == "bench"));
     let mut command = workspace.cargo();
@@ -56,14 +56,14 @@ pub(crate) fn run(workspace: &Workspace, arguments: Bench) -> Result<()> {
     }
     if let Some(name) = arguments.against {
         let saved = has_baseline(&workspace.target.join("criterion"), &name);
-        ensure!(saved, "nothing was saved under the name `{name}` yet: cargo xtask bench --save {name}");
-        // Lenient: a bench that is newer than the baseline is measured, and compared with nothing.
+        ensure!(saved, "no results are saved as `{name}`: run cargo xtask bench --save {name}");
+        // Lenient: a benchmark without a baseline is measured but not compared.
         command.args(["--baseline-lenient", &name]);
     }
     shell::run(command.args(arguments.filter))
 }
 
-/// Whether any bench has figures of that name below a folder.
+/// Returns whether any benchmark below a folder has results of that name.
 fn has_baseline(folder: &Path, name: &str) -> bool {
     let mut folders =
         fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).filter(|path| path.is_dir());

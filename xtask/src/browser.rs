@@ -1,4 +1,4 @@
-//! Whether people could take part in a study, and look at data sets.
+//! Tests the web pages in a browser.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,26 +10,27 @@ use crate::shell::{self, skipped};
 use crate::workspace::Workspace;
 use crate::{dataset, python};
 
-/// What Chromium goes by on different systems.
+/// Names of Chromium on different systems.
 const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 
 pub(crate) fn run(workspace: &Workspace) -> Result<()> {
     let python = python::system()?;
     let find = || NAMES.into_iter().find(|name| shell::answers(name, "--version"));
     let Some(chromium) = shell::find_or_install(find, &["chromium"]) else {
-        return Err(skipped("there is no Chromium on this machine, nor a way to install it"));
+        return Err(skipped("Chromium is not installed and cannot be installed"));
     };
     let folder = workspace.target.join("browser");
     let (synthetic, other, real) = (folder.join("synthetic"), folder.join("other"), folder.join("real"));
     let small = ["--frames", "2", "--set", "field.width_px=640", "--set", "field.height_px=520"];
-    // The program of the integration tests: built with them, because without their dependencies libraries have other features.
+    // Builds the program with the integration tests, because the features of libraries depend on the packages that are
+    // built.
     shell::run(workspace.cargo_light(&["test", "--no-run"]).args(["--test", "it"]))?;
     let program = workspace.program("debug", "papsynth");
     let generate = |out: &Path, more: &[&str]| dataset::generate(Command::new(&program), out, small.iter().chain(more));
     generate(&synthetic, &[])?;
-    // What stands for real: pictures without truth, of another preset. Whether it is makes no difference to the page.
+    // Images of another preset, without ground truth, replace real images.
     generate(&other, &["--preset", "high-grade", "--seed", "1"])?;
-    copy_pictures(&other.join("images"), &real)?;
+    copy_images(&other.join("images"), &real)?;
     let stack = folder.join("stack");
     generate(&stack, &["--set", "focus.planes=5", "--set", "focus.step_um=1.5"])?;
     let run = |script: &str, folders: &[&PathBuf]| {
@@ -40,8 +41,8 @@ pub(crate) fn run(workspace: &Workspace) -> Result<()> {
     run("browser_view.py", &[&stack, &folder.join("view")])
 }
 
-/// Copies the pictures of a folder into one that is empty before.
-fn copy_pictures(from: &Path, to: &Path) -> Result<()> {
+/// Replaces a folder by the images of another.
+fn copy_images(from: &Path, to: &Path) -> Result<()> {
     shell::remove(to)?;
     shell::make(to)?;
     for entry in fs::read_dir(from).with_context(|| format!("cannot read {}", from.display()))? {

@@ -1,4 +1,4 @@
-//! Everything that has to pass before a change is taken.
+//! The checks for a change.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,12 +14,12 @@ use crate::{browser, dataset, deps, equations, external, hashes, package, supply
 
 type Step = (&'static str, fn(&Workspace) -> Result<()>);
 
-/// Cheap ones first. The golden images are part of the tests.
+/// In order of increasing time. The golden images are part of the tests.
 const STEPS: [Step; 12] = [
     ("format", |workspace| shell::run(workspace.cargo().args(["fmt", "--all", "--check"]))),
     ("dependencies", deps::run),
     ("equations", equations::run),
-    ("real material", |_| real_material()),
+    ("reference images", |_| reference_images()),
     ("lints", |workspace| lints(workspace.cargo_light(&["clippy"]))),
     ("documentation", |workspace| documentation(workspace.cargo_light(&["doc"]))),
     ("tests", |workspace| test::suite(workspace, Workspace::cargo_light, &[])),
@@ -30,7 +30,8 @@ const STEPS: [Step; 12] = [
     ("wasm32", hashes::wasm),
 ];
 
-/// What takes heavy crates, the heavier readers, other processors, and what is done to publish; at most 80 minutes with everything before.
+/// Steps with heavy crates, heavy readers, other processors and packaging; at most 80 minutes including the steps
+/// above.
 const FULL: [Step; 10] = [
     ("licences", |workspace| supply::deny(workspace, &[])),
     ("heavy lints", |workspace| lints(workspace.cargo_heavy(&["clippy"]))),
@@ -44,7 +45,7 @@ const FULL: [Step; 10] = [
     ("processors", |workspace| hashes::run(workspace, false, true)),
 ];
 
-/// Files and folders that require the longer tier, besides the folders of heavy crates and of crates with features that bring them along.
+/// Files and folders that require --full after a change, in addition to the folders of heavy packages.
 const COVERED: [&str; 9] = [
     "Cargo.lock",
     "crates/*/src/interop.rs",
@@ -82,7 +83,7 @@ pub(crate) fn run(workspace: &Workspace, full: bool) -> Result<()> {
         println!("{words}");
         table.push_str(&format!("{name:<18} {:>6.0} s  {words}\n", time.as_secs_f64()));
     }
-    println!("\n{table}{:<18} {:>6.0} s", "together", total.as_secs_f64());
+    println!("\n{table}{:<18} {:>6.0} s", "total", total.as_secs_f64());
     ensure!(failed.is_empty(), "failed: {}", failed.join(", "));
     if full {
         return record(workspace);
@@ -91,34 +92,34 @@ pub(crate) fn run(workspace: &Workspace, full: bool) -> Result<()> {
     Ok(())
 }
 
-/// Runs doc tests of the technique crates with all features: these convert to types of other libraries.
+/// Runs doc tests of the technique crates with all features, which convert to types of other libraries.
 fn feature_doc_tests(workspace: &Workspace) -> Result<()> {
     let packages = deps::pure_crates().filter(|name| *name != "papsynth").flat_map(|name| ["--package", name]);
     shell::run(workspace.cargo().args(["test", "--doc", "--all-features"]).args(packages))
 }
 
-/// Where the commit is recorded at which the longer tier last passed.
+/// Returns the file with the commit at which --full last passed.
 fn recorded(workspace: &Workspace) -> PathBuf {
     workspace.target.join("ci-full-passed")
 }
 
-/// What Git prints of the files that the longer tier covers.
+/// Returns the output of a Git command for the files that --full covers.
 fn git(workspace: &Workspace, words: &[&str]) -> Result<String> {
     shell::output(Command::new("git").args(words).arg("--").args(covered(workspace)).current_dir(&workspace.root))
 }
 
 fn record(workspace: &Workspace) -> Result<()> {
     if !git(workspace, &["status", "--porcelain"])?.is_empty() {
-        println!("\nNot recorded: files that --full covers have uncommitted changes.");
+        println!("\nNot recorded, because files that --full covers have uncommitted changes.");
         return Ok(());
     }
     shell::write(&recorded(workspace), &git(workspace, &["rev-list", "--max-count=1", "HEAD"])?)
 }
 
-/// Whether the longer tier is required, and by which files.
+/// Returns a message that states whether --full is required, and by which files.
 fn required(workspace: &Workspace) -> String {
     let Ok(commit) = fs::read_to_string(recorded(workspace)) else {
-        return format!("--full has not passed here. It covers:\n{}", covered(workspace).join("\n"));
+        return format!("--full has not passed on this machine yet. It covers:\n{}", covered(workspace).join("\n"));
     };
     let commit = commit.trim();
     match git(workspace, &["diff", "--name-only", commit]) {
@@ -132,18 +133,18 @@ fn required(workspace: &Workspace) -> String {
     }
 }
 
-#[expect(clippy::disallowed_methods, reason = "the time goes to whoever waits, and into no image")]
+#[expect(clippy::disallowed_methods, reason = "the time is only printed")]
 fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
     let start = Instant::now();
     (work(), start.elapsed())
 }
 
-/// The tests themselves leave out what needs the real material; here it is only said, once.
-fn real_material() -> Result<()> {
+/// Reports whether tests with real images are skipped.
+fn reference_images() -> Result<()> {
     match std::env::var_os("PAPSYNTH_REFERENCE") {
         Some(folder) if Path::new(&folder).is_dir() => Ok(()),
-        Some(folder) => bail!("PAPSYNTH_REFERENCE is {}, which is no folder", folder.display()),
-        None => Err(skipped("PAPSYNTH_REFERENCE is not set, so the tests on real cells are left out")),
+        Some(folder) => bail!("PAPSYNTH_REFERENCE = {}: expected a folder", folder.display()),
+        None => Err(skipped("PAPSYNTH_REFERENCE is not set, so tests with real images are skipped")),
     }
 }
 
@@ -152,6 +153,6 @@ fn lints(mut clippy: Command) -> Result<()> {
 }
 
 fn documentation(mut doc: Command) -> Result<()> {
-    // Libraries alone: the program and the engine are both called papsynth and would write to the same place.
+    // Only libraries: the program and the engine are both called papsynth and would write to the same folder.
     shell::run(doc.args(["--lib", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
 }

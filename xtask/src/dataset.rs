@@ -1,4 +1,4 @@
-//! A first data set to look at.
+//! Generates an example data set.
 
 use std::ffi::OsStr;
 use std::path::Path;
@@ -17,12 +17,12 @@ pub(crate) fn run(workspace: &Workspace) -> Result<()> {
     }
     let [fields, stack] = folders.each_ref().map(|folder| workspace.shown(folder));
     println!(
-        "\nEight labelled fields are in {fields}, a focus stack in {stack}; crates/papsynth-dataset/README.md names their files."
+        "\nEight labelled fields: {fields}\nA focus stack: {stack}\ncrates/papsynth-dataset/README.md describes the files."
     );
     Ok(())
 }
 
-/// The program that makes, checks and converts data sets and does nothing else, in release, with these features: the quickest build.
+/// Returns the program in release mode with only these features, which is the fastest build.
 pub(crate) fn program(workspace: &Workspace, features: &str) -> Command {
     let mut command = workspace.cargo();
     command.args(["run", "--release", "--package", "papsynth-cli", "--no-default-features"]);
@@ -30,7 +30,7 @@ pub(crate) fn program(workspace: &Workspace, features: &str) -> Command {
     command
 }
 
-/// Runs `papsynth generate` of a program into a folder that is empty before.
+/// Runs `papsynth generate` with a new folder.
 pub(crate) fn generate<I: AsRef<OsStr>>(
     mut program: Command,
     out: &Path,

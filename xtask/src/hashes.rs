@@ -1,4 +1,4 @@
-//! The same hashes on every machine.
+//! Compares hashes of the output on several platforms.
 
 use std::process::Command;
 
@@ -8,16 +8,16 @@ use crate::deps;
 use crate::shell::{self, need_target, skipped};
 use crate::workspace::Workspace;
 
-/// What makes and prints them.
+/// The package that computes and prints the hashes.
 const PACKAGE: &str = "papsynth-hashes";
 
-/// Processors that compilers know, from the plainest on; `native` is the one at hand.
+/// Target processors of the compiler.
 const PROCESSORS: [&str; 3] = ["x86-64", "x86-64-v3", "native"];
 
-/// Another kind of processor, for which the compiler brings its own linker and C library.
+/// Target for aarch64, for which the compiler includes linker and C library.
 const AARCH64: &str = "aarch64-unknown-linux-musl";
 
-/// Without a system, and with one that programs can print to.
+/// Targets without an operating system, and with WASI.
 const WASM: [&str; 2] = ["wasm32-unknown-unknown", "wasm32-wasip1"];
 
 pub(crate) fn run(workspace: &Workspace, bless: bool, full: bool) -> Result<()> {
@@ -31,10 +31,10 @@ pub(crate) fn run(workspace: &Workspace, bless: bool, full: bool) -> Result<()> 
     Ok(())
 }
 
-/// Compiled for several processors.
+/// Compares hashes of programs compiled for several processors.
 fn on_other_processors(workspace: &Workspace) -> Result<()> {
     if !cfg!(all(target_arch = "x86_64", target_os = "linux")) {
-        println!("skipped: processors are known here for x86-64 and Linux alone");
+        println!("skipped: target processors are only compared on Linux for x86-64");
         return Ok(());
     }
     for processor in PROCESSORS {
@@ -47,12 +47,12 @@ fn on_other_processors(workspace: &Workspace) -> Result<()> {
     Ok(())
 }
 
-/// Compiled for aarch64.
+/// Compares hashes of a program compiled for aarch64.
 fn on_aarch64(workspace: &Workspace) -> Result<()> {
     let emulator =
         || ["qemu-aarch64", "qemu-aarch64-static"].into_iter().find(|name| shell::answers(name, "--version"));
     let Some(emulator) = shell::find_or_install(emulator, &["qemu-user-static"]) else {
-        return Err(skipped("qemu-user, which runs programs for aarch64, is not installed"));
+        return Err(skipped("qemu-user is not installed and cannot be installed"));
     };
     need_target(AARCH64)?;
     let folder = workspace.target.join("hashes");
@@ -63,7 +63,7 @@ fn on_aarch64(workspace: &Workspace) -> Result<()> {
     compare(workspace, Command::new(emulator).arg(program), "aarch64")
 }
 
-/// The pure crates without threads and without a source of entropy, and what they give in wasm32.
+/// Checks the crates without files and threads for wasm32, and compares hashes.
 pub(crate) fn wasm(workspace: &Workspace) -> Result<()> {
     let [bare, wasi] = WASM;
     WASM.into_iter().try_for_each(need_target)?;
@@ -71,26 +71,27 @@ pub(crate) fn wasm(workspace: &Workspace) -> Result<()> {
     command.args(["check", "--target", bare, "--lib", "--no-default-features"]);
     shell::run(command.args(deps::pure_crates().flat_map(|name| ["--package", name])))?;
     if !shell::answers("node", "--version") {
-        return Err(skipped("Node is not installed, which runs programs for wasm32"));
+        return Err(skipped("Node is not installed"));
     }
     shell::run(workspace.cargo().args(["build", "--target", wasi, "--package", PACKAGE]))?;
     let program = workspace.target.join(wasi).join("debug").join(PACKAGE).with_extension("wasm");
     compare(workspace, Command::new("node").arg(workspace.root.join("xtask/src/wasi.mjs")).arg(program), "wasm32")
 }
 
-/// Fails if hashes that a program prints on `machine` are not those of the repository.
+/// Fails if the hashes printed by a program differ from those in fixtures/hashes.txt.
 fn compare(workspace: &Workspace, program: &mut Command, machine: &str) -> Result<()> {
     let file = workspace.root.join("fixtures/hashes.txt");
     let (found, expected) = (shell::output(program)?, shell::read(&file)?);
     let pairs = expected.lines().zip(found.lines()).filter(|(expected, found)| expected != found);
-    let others: Vec<String> = pairs.map(|(expected, found)| format!("\n  {expected}\n  is {found}")).collect();
+    let others: Vec<String> =
+        pairs.map(|(expected, found)| format!("\n  expected {expected}\n  found    {found}")).collect();
     ensure!(
         found == expected,
-        "on {machine} {} hashes are others than in {}:{}",
+        "{machine}: {} hashes differ from {}:{}",
         others.len(),
         workspace.shown(&file),
         others.concat()
     );
-    println!("{machine}: {} hashes agree", expected.lines().count());
+    println!("{machine}: all {} hashes agree", expected.lines().count());
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! The Python package: built, installed where nothing else is, and tried.
+//! Builds, installs and tests the Python package.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,44 +16,44 @@ const TESTERS: &str = "numpy\npillow\npytest\nscipy\nscikit-learn\n";
 
 const ENGINES: &str = "numpy\nray\ndask[distributed]\nboto3\nmoto[server]\n";
 
-/// Where a program finds all it needs in itself.
-const STATIC: &str = "x86_64-unknown-linux-musl";
+/// Target of the static program.
+const STATIC_TARGET: &str = "x86_64-unknown-linux-musl";
 
-/// Linux since 2019: Debian 10, Ubuntu 20.04, RHEL 8 and what is newer.
-const OLD: [&str; 5] = ["--zig", "--compatibility", "manylinux_2_28", "--target", "x86_64-unknown-linux-gnu"];
+/// Linux since 2019: Debian 10, Ubuntu 20.04, RHEL 8 and newer.
+const MANYLINUX: [&str; 5] = ["--zig", "--compatibility", "manylinux_2_28", "--target", "x86_64-unknown-linux-gnu"];
 
 const PACKAGE: &str = "crates/papsynth-python";
 
 pub(crate) fn run(workspace: &Workspace) -> Result<()> {
     let wheel = wheel(workspace, "wheels", &[])?;
-    tried(workspace, &wheel, &program(workspace)?)
+    test(workspace, &wheel, &program(workspace)?)
 }
 
 pub(crate) fn releases(workspace: &Workspace) -> Result<()> {
     if !cfg!(all(target_os = "linux", target_arch = "x86_64")) {
-        return Err(skipped("these are built on Linux for x86-64"));
+        return Err(skipped("releases can only be built on Linux for x86-64"));
     }
-    shell::need_target(STATIC)?;
-    let wheel = wheel(workspace, "releases", &OLD)?;
-    shell::run(workspace.cargo().args(["build", "--release", "--package", "papsynth-cli", "--target", STATIC]))?;
+    shell::need_target(STATIC_TARGET)?;
+    let wheel = wheel(workspace, "releases", &MANYLINUX)?;
+    shell::run(workspace.cargo().args(["build", "--release", "--package", "papsynth-cli", "--target", STATIC_TARGET]))?;
     let program = workspace.target.join("releases/papsynth");
-    shell::copy(&workspace.target.join(STATIC).join("release/papsynth"), &program)?;
-    // A program that wants a loader names it; one that is static has no such name.
+    shell::copy(&workspace.target.join(STATIC_TARGET).join("release/papsynth"), &program)?;
+    // A dynamically linked program contains the name of its loader.
     let bytes = fs::read(&program)?;
     ensure!(!bytes.windows(9).any(|word| word == b"/ld-linux" || word == b"/ld-musl-"), "papsynth is not static");
     for path in [&wheel, &program] {
         println!("{} ({:.1} MB)", workspace.shown(path), fs::metadata(path)?.len() as f64 / 1e6);
     }
-    tried(workspace, &wheel, &program)
+    test(workspace, &wheel, &program)
 }
 
-/// Runs the package's tests with an installed wheel, against a program.
-fn tried(workspace: &Workspace, wheel: &Path, program: &Path) -> Result<()> {
+/// Runs the tests of the package with an installed wheel and the command line program.
+fn test(workspace: &Workspace, wheel: &Path, program: &Path) -> Result<()> {
     let tests =
         ["test_package.py", "test_examples.py"].map(|name| workspace.root.join(PACKAGE).join("tests").join(name));
     let mut pytest = Command::new(installed(workspace, "package", TESTERS, wheel)?);
     pytest.args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]).args(tests);
-    // Out of the repository, so that the package is the installed one.
+    // Outside the source folder, so that the installed package is imported.
     shell::run(pytest.env("PAPSYNTH", program).env("PYTHONDONTWRITEBYTECODE", "1").current_dir(&workspace.target))
 }
 
@@ -72,20 +72,20 @@ pub(crate) fn cluster(workspace: &Workspace) -> Result<()> {
     run("cluster_store.py", &[&program, &folder.join("store")])?;
     let is_here = || ["slurmctld", "slurmd", "munged"].iter().all(|name| shell::answers(name, "-V")).then_some(());
     if !shell::is_root() || shell::find_or_install(is_here, &["slurm-wlm", "munge"]).is_none() {
-        return Err(skipped("there is no Slurm on this machine, nor a way to install it"));
+        return Err(skipped("Slurm is not installed and cannot be installed"));
     }
     run("cluster_slurm.py", &[&program, &folder.join("slurm"), &folder.join("dask/root.txt")])
 }
 
-/// Builds the wheel into a folder below the target's, which is emptied.
+/// Builds the wheel in a folder below the target folder, which is replaced.
 fn wheel(workspace: &Workspace, folder: &str, more: &[&str]) -> Result<PathBuf> {
     let python = python::environment(workspace, "maturin", BUILDER)?;
     let out = workspace.target.join(folder);
     shell::remove(&out)?;
-    // It looks for zig where programs are looked for.
-    let others = std::env::var_os("PATH").unwrap_or_default();
+    // maturin looks for zig in PATH.
+    let path = std::env::var_os("PATH").unwrap_or_default();
     let own = python.parent().map(Path::to_owned).into_iter();
-    let path = std::env::join_paths(own.chain(std::env::split_paths(&others)))?;
+    let path = std::env::join_paths(own.chain(std::env::split_paths(&path)))?;
     let mut command = Command::new(&python);
     command.args(["-m", "maturin", "build", "--release"]).args(more).arg("--out").arg(&out).env("PATH", path);
     shell::run(command.env("CARGO_TARGET_DIR", &workspace.target).current_dir(workspace.root.join(PACKAGE)))?;
@@ -93,14 +93,14 @@ fn wheel(workspace: &Workspace, folder: &str, more: &[&str]) -> Result<PathBuf> 
     Ok(wheels.next().with_context(|| format!("no wheel in {}", workspace.shown(&out)))??.path())
 }
 
-/// The Python of an environment with these packages and the wheel, which is installed anew.
+/// Returns the Python of an environment with these packages and the wheel, which is reinstalled.
 fn installed(workspace: &Workspace, name: &str, packages: &str, wheel: &Path) -> Result<PathBuf> {
     let python = python::environment(workspace, name, packages)?;
     shell::run(python::pip(&python, "install").args(["--force-reinstall", "--no-deps"]).arg(wheel))?;
     Ok(python)
 }
 
-/// The command line, to compare with.
+/// Builds the command line program.
 fn program(workspace: &Workspace) -> Result<PathBuf> {
     let words = ["build", "--release", "--package", "papsynth-cli", "--features", "papsynth-cli/cloud"];
     shell::run(workspace.cargo().args(words))?;

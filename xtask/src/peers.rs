@@ -1,4 +1,4 @@
-//! The whole simulator and its parts against good programs of others, and against itself.
+//! Benchmarks of the simulator and its parts against other programs.
 
 mod history;
 mod race;
@@ -14,28 +14,32 @@ use crate::workspace::Workspace;
 use race::Race;
 use rows::ROWS;
 
-/// Does the works of a table in our way and in a good program of others, and prints times, ratios and what is wanted
+/// Measures the same work with our code and with other programs, and prints times, ratios and targets
 ///
-/// Both sides run in turn on one thread of this machine. Nothing is asserted: a machine has good days and bad ones.
+/// Both run alternately on one thread of this machine. A missed target is not a failure.
 #[derive(Args)]
 pub(crate) struct Peers {
-    /// Runs the rows whose names begin so
+    /// Runs only the rows whose names begin with NAME
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     only: Vec<String>,
-    /// How often both sides are measured in turn
+    /// Number of alternating measurements
     #[arg(long, value_name = "N", default_value_t = 5)]
     repetitions: usize,
-    /// Adds a line to benches/history.jsonl and draws docs/performance.svg
+    /// Appends the result to benches/history.jsonl and draws docs/performance.svg
     #[arg(long, conflicts_with = "only")]
     record: bool,
 }
 
-/// Runs the race and prints the table.
+/// Runs the benchmarks and prints the table.
 pub(crate) fn run(workspace: &Workspace, Peers { only, repetitions, record }: &Peers) -> Result<()> {
     let begins = |name: &str| only.is_empty() || only.iter().any(|word| name.starts_with(word));
     let names = ROWS.map(|row| row.name);
     for word in only {
-        ensure!(names.iter().any(|name| name.starts_with(word)), "no row begins with `{word}`; there are {names:?}");
+        ensure!(
+            names.iter().any(|name| name.starts_with(word)),
+            "no row begins with `{word}`: expected the beginning of one of {}",
+            names.join(", ")
+        );
     }
     let requirements = shell::read(&workspace.root.join("benches/peers/requirements.txt"))?;
     let (python, missing) = match python::environment(workspace, "peers", &requirements) {
@@ -49,8 +53,8 @@ pub(crate) fn run(workspace: &Workspace, Peers { only, repetitions, record }: &P
         eprintln!("{}: {}", row.name, row.work);
         lines.push((row, race.row(row)?));
     }
-    println!("\nProcess CPU time on one thread, medians, both sides in turn in this run:\n\n{}", table::text(&lines));
-    println!("Rows of two cores are wall time. Ours draws exact Poisson deviates for shot noise, as the peers do.");
+    println!("\nProcess CPU time on one thread, medians of alternating measurements:\n\n{}", table::text(&lines));
+    println!("Rows of two cores are wall time. Both draw exact Poisson deviates for shot noise.");
     race.notes.iter().for_each(|note| println!("{note}"));
     match missing {
         Some(reason) => Err(reason),

@@ -1,4 +1,4 @@
-//! Python programs that check or race ours, each in an environment of its own below the target folder.
+//! Python environments below the target folder.
 
 use std::fs;
 use std::path::PathBuf;
@@ -9,16 +9,15 @@ use anyhow::{Context, Result};
 use crate::shell::{self, skipped};
 use crate::workspace::Workspace;
 
-/// The Python of this machine, for programs that need none but its own library.
+/// Returns the Python of this machine, for programs that only need its standard library.
 pub(crate) fn system() -> Result<PathBuf> {
     let found = ["python3", "python"].into_iter().find(|name| shell::answers(name, "--version"));
-    found.map(PathBuf::from).ok_or_else(|| skipped("there is no Python on this machine"))
+    found.map(PathBuf::from).ok_or_else(|| skipped("Python is not installed"))
 }
 
-/// Makes the environment `target/python/NAME` and returns its Python, or takes the one from the last time if it holds the same packages.
+/// Creates the environment `target/python/NAME`, or reuses it if it has the same packages, and returns its Python.
 ///
-/// `requirements` is the text of a requirements file. Where an environment cannot be made, that is skipped: a machine with only
-/// Rust is welcome.
+/// `requirements` is the text of a requirements file. The step is skipped if the environment cannot be created.
 pub(crate) fn environment(workspace: &Workspace, name: &str, requirements: &str) -> Result<PathBuf> {
     let folder = workspace.target.join("python").join(name);
     let python = folder.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
@@ -28,16 +27,16 @@ pub(crate) fn environment(workspace: &Workspace, name: &str, requirements: &str)
     }
     shell::make(&folder)?;
     shell::run(Command::new(system()?).args(["-m", "venv", "--clear"]).arg(&folder))
-        .map_err(|error| skipped(format!("Python cannot make an environment: {error}")))?;
+        .map_err(|error| skipped(format!("Python cannot create an environment: {error}")))?;
     let list = folder.join("requirements.txt");
     shell::write(&list, requirements)?;
     shell::run(pip(&python, "install").args(["--only-binary", ":all:", "-r"]).arg(&list))
-        .map_err(|error| skipped(format!("the packages of Python cannot be had: {error}")))?;
+        .map_err(|error| skipped(format!("Python packages cannot be installed: {error}")))?;
     fs::rename(&list, &stamp).with_context(|| format!("cannot write {}", stamp.display()))?;
     Ok(python)
 }
 
-/// A subcommand of pip, which says nothing but what goes wrong.
+/// Returns a subcommand of pip, which prints errors only.
 pub(crate) fn pip(python: &PathBuf, subcommand: &str) -> Command {
     let mut command = Command::new(python);
     command.args(["-m", "pip", subcommand, "--quiet", "--disable-pip-version-check"]);

@@ -1,4 +1,4 @@
-//! How far synthetic fields are from real ones that nothing was fitted to.
+//! Compares synthetic fields with real fields that were not used for fitting.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -10,22 +10,22 @@ use crate::shell::{self, Skipped, skipped};
 use crate::workspace::Workspace;
 use crate::{dataset, python};
 
-/// Size of the real fields' pixels, µm.
+/// Pixel size of the real fields, µm.
 const PIXEL_UM: &str = "0.33";
 
-/// Fields that are generated for each judgement.
+/// Number of fields generated for each comparison.
 const FRAMES: &str = "16";
 
-/// Packages of the pixel forest.
+/// Packages of the random forest.
 const FOREST: &str = "numpy\npillow\npycocotools\nscikit-learn\nscipy\n";
 
-/// A grade of the real fields, and the preset that shows such slides.
+/// Grades of the real fields: code, name and preset.
 const GRADES: [(&str, &str, &str); 3] =
     [("N", "negative", "lbc"), ("L", "low-grade lesion", "lsil"), ("H", "high-grade lesion", "high-grade")];
 
 pub(crate) fn run(workspace: &Workspace, quick: bool) -> Result<()> {
     let Some(reference) = std::env::var_os("PAPSYNTH_REFERENCE").map(PathBuf::from) else {
-        return Err(skipped("PAPSYNTH_REFERENCE is not set, so there are no real fields to judge by"));
+        return Err(skipped("PAPSYNTH_REFERENCE is not set, so there are no real fields"));
     };
     let folder = workspace.target.join("realism");
     shell::make(&folder)?;
@@ -47,7 +47,7 @@ pub(crate) fn run(workspace: &Workspace, quick: bool) -> Result<()> {
         }
         for (what, recipe) in recipes {
             let fields = folder.join(format!("fields-{what}-{grade}"));
-            // Few real fields are of one slide.
+            // The real fields are of many slides.
             let words = ["--frames", FRAMES, "--set", "slide.fields_per_slide=1"].map(PathBuf::from);
             dataset::generate(program(workspace), &fields, recipe.into_iter().chain(words))?;
             let report = folder.join(format!("report-{what}-{grade}"));
@@ -62,7 +62,7 @@ pub(crate) fn run(workspace: &Workspace, quick: bool) -> Result<()> {
         table += &match python::environment(workspace, "forest", FOREST) {
             Ok(python) => forest(workspace, &python, &reference, &folder, what, recipe)?,
             Err(reason) if reason.is::<Skipped>() => {
-                format!("a real field | {what} | pixel forest | skipped: {reason} |\n")
+                format!("a real field | {what} | random forest | skipped: {reason} |\n")
             }
             Err(error) => return Err(error),
         };
@@ -78,7 +78,7 @@ fn program(workspace: &Workspace) -> Command {
     command
 }
 
-/// Two folders with every other field of each grade, and what is known of them.
+/// Writes two folders, each with every second field of each grade and its annotations.
 fn halves(fields: &Path, folder: &Path) -> Result<[PathBuf; 2]> {
     let text = shell::read(&fields.join("frames.csv"))?;
     let halves = ["fit", "judge"].map(|name| folder.join(name));
@@ -100,11 +100,11 @@ fn halves(fields: &Path, folder: &Path) -> Result<[PathBuf; 2]> {
     Ok(halves)
 }
 
-/// Lines of the table, of a report.
+/// Returns the lines of the table for a report.
 fn judgements(report: &Path, fields: &str, recipe: &str) -> Result<String> {
     let file = report.join("report.json");
     let report: Value =
-        serde_json::from_str(&shell::read(&file)?).with_context(|| format!("{} is no JSON", file.display()))?;
+        serde_json::from_str(&shell::read(&file)?).with_context(|| format!("{} is not valid JSON", file.display()))?;
     let list = |value: &Value| value.as_array().cloned().unwrap_or_default();
     let mut lines = String::new();
     for test in list(&report["two_sample"]) {
@@ -140,7 +140,7 @@ fn judgements(report: &Path, fields: &str, recipe: &str) -> Result<String> {
     Ok(lines)
 }
 
-/// Trains a pixel forest on synthetic fields and has it find the nuclei of a real one.
+/// Trains a random forest on pixels of synthetic fields, and segments the nuclei of a real field.
 fn forest(
     workspace: &Workspace,
     python: &Path,
@@ -151,7 +151,7 @@ fn forest(
 ) -> Result<String> {
     let stack = reference.join("focus_stack");
     let fields = folder.join(format!("fields-forest-{what}"));
-    // As sharp as the default, of as many planes as that field was fused of, in pixels of about the same size.
+    // As sharp as the default, with the number of fused planes and about the pixel size of the real field.
     let settings = [
         "field.pixel_um=0.31",
         "field.width_px=800",
@@ -166,9 +166,9 @@ fn forest(
     let mut command = Command::new(python);
     command.arg(workspace.root.join("xtask/python/pixel_forest.py")).arg(&fields);
     command.arg(stack.join("extended_focus.png")).arg(stack.join("nuclei.png"));
-    let found: Value = serde_json::from_str(&shell::output(&mut command)?).context("the pixel forest gave no JSON")?;
+    let found: Value = serde_json::from_str(&shell::output(&mut command)?).context("the output of pixel_forest.py")?;
     Ok(format!(
-        "a real field | {what}, extended focus | nuclei by a pixel forest of {} fields | Dice {} (on its own kind {}) |\n",
+        "a real field | {what}, extended focus | nuclei by a random forest of {} fields | Dice {} (on synthetic fields {}) |\n",
         found["fields"], found["dice_real"], found["dice_synthetic"]
     ))
 }

@@ -1,4 +1,4 @@
-//! Other programs, files whose names stand in errors, and what cannot be done on this machine.
+//! Runs other programs, and accesses files with errors that contain their names.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -7,19 +7,19 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Error, Result, anyhow, ensure};
 
-/// Why something cannot be done here, which is nobody's fault.
+/// The reason why a step is skipped on this machine.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub(crate) struct Skipped(String);
 
-/// [`Skipped`] on a person's machine; a failure where `CI` is set, since nobody would read the sentence there.
+/// Returns [`Skipped`], or a failure if `CI` is set, where a message would be overlooked.
 pub(crate) fn skipped(reason: impl Into<String>) -> Error {
     let reason = reason.into();
     let in_ci = std::env::var("CI").is_ok_and(|value| !matches!(value.as_str(), "" | "0" | "false"));
     if in_ci { anyhow!("{reason}, and CI is set") } else { Skipped(reason).into() }
 }
 
-/// Runs a program to its end, its output going where ours goes.
+/// Runs a program, with our standard output and error.
 pub(crate) fn run(command: &mut Command) -> Result<()> {
     eprintln!("$ {command:?}");
     let status = command.status().with_context(|| format!("cannot start {command:?}"))?;
@@ -27,25 +27,25 @@ pub(crate) fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Runs a program to its end and returns what it wrote to its standard output.
+/// Runs a program and returns its standard output.
 pub(crate) fn output(command: &mut Command) -> Result<String> {
     let output = command.stderr(Stdio::inherit()).output().with_context(|| format!("cannot start {command:?}"))?;
     ensure!(output.status.success(), "{command:?} failed ({})", output.status);
-    String::from_utf8(output.stdout).with_context(|| format!("{command:?} wrote something else than text"))
+    String::from_utf8(output.stdout).with_context(|| format!("the output of {command:?} is not valid UTF-8"))
 }
 
-/// Whether a program is there at all and answers to this word.
+/// Returns whether a program is installed and accepts this argument.
 pub(crate) fn answers(program: &str, word: &str) -> bool {
     succeeds(Command::new(program).arg(word))
 }
 
-/// Whether a program ends well, which nobody hears of.
+/// Runs a program without output, and returns whether it succeeds.
 pub(crate) fn succeeds(command: &mut Command) -> bool {
     let command = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     command.status().is_ok_and(|status| status.success())
 }
 
-/// What `find` finds, at once or after packages of Debian are installed, where this is one and nobody need be asked.
+/// Returns the result of `find`, if necessary after installing Debian packages as root.
 pub(crate) fn find_or_install<T>(find: impl Fn() -> Option<T>, packages: &[&str]) -> Option<T> {
     let apt =
         |words: &[&str]| run(Command::new("apt-get").args(words).env("DEBIAN_FRONTEND", "noninteractive")).is_ok();
@@ -62,8 +62,7 @@ pub(crate) fn is_root() -> bool {
     output(Command::new("id").arg("-u")).is_ok_and(|id| id.trim() == "0")
 }
 
-/// Fails if programs cannot be built for a target, which rustup adds if need be: a toolchain that came without it, or a machine without
-/// a network, cannot have it.
+/// Adds a target with rustup if it is missing; skips the step if that fails.
 pub(crate) fn need_target(target: &str) -> Result<()> {
     let is_installed = || -> Result<bool> {
         let libraries = output(rustc().args(["--print", "target-libdir", "--target", target]))?;
@@ -79,7 +78,7 @@ pub(crate) fn rustc() -> Command {
     Command::new(std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into()))
 }
 
-/// The last line of a text that is not empty, as JSON.
+/// Parses the last line of a text as JSON.
 pub(crate) fn last_json(text: &str) -> Result<serde_json::Value> {
     let line = text.trim_end().lines().last().unwrap_or_default();
     serde_json::from_str(line).with_context(|| format!("expected a line of JSON, found `{line}`"))
@@ -98,12 +97,12 @@ pub(crate) fn copy(from: &Path, to: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Makes a folder and those around it, where they are not there.
+/// Creates a folder and its parents if they are missing.
 pub(crate) fn make(folder: &Path) -> Result<()> {
-    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))
+    fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))
 }
 
-/// Removes a folder with all in it, if it is there.
+/// Removes a folder and its contents, if it exists.
 pub(crate) fn remove(folder: &Path) -> Result<()> {
     match fs::remove_dir_all(folder) {
         Err(error) if error.kind() != ErrorKind::NotFound => {

@@ -1,4 +1,4 @@
-//! What comes from others and what goes to them: whether `deny.toml` allows it, a bill of materials, and packages.
+//! Checks of dependencies, the bill of materials, and packages.
 
 use std::fs;
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ use serde_json::Value;
 use crate::shell::{self, skipped};
 use crate::workspace::Workspace;
 
-/// The crate whose program is shipped.
+/// The crate of the released program.
 const PROGRAM: &str = "papsynth-cli";
 
 pub(crate) fn deny(workspace: &Workspace, checks: &[String]) -> Result<()> {
@@ -32,10 +32,10 @@ pub(crate) fn bill(workspace: &Workspace) -> Result<PathBuf> {
     const NAME: &str = "papsynth.cdx";
     let mut command = tool(workspace, "cargo-cyclonedx", "0.5.9")?;
     command.args(["cyclonedx", "--format", "json", "--spec-version", "1.5", "--all-features", "--target", "all"]);
-    // With this variable it writes no serial number.
+    // This variable suppresses the serial number.
     shell::run(command.args(["--override-filename", NAME]).env("SOURCE_DATE_EPOCH", "0"))?;
     let mut text = String::new();
-    // It writes one file beside the manifest of each member.
+    // It writes a file next to the manifest of each member.
     for package in &workspace.packages {
         let written = package.folder().join(format!("{NAME}.json"));
         if package.name == PROGRAM {
@@ -51,13 +51,13 @@ pub(crate) fn bill(workspace: &Workspace) -> Result<PathBuf> {
     Ok(path)
 }
 
-/// A program that Cargo builds and installs below the target folder, if this version is not there yet.
+/// Returns a program, which Cargo installs below the target folder if this version is missing.
 fn tool(workspace: &Workspace, name: &str, version: &str) -> Result<Command> {
     let root = workspace.target.join("tools");
     let installed = fs::read_to_string(root.join(".crates.toml")).unwrap_or_default();
     if !installed.contains(&format!("\"{name} {version} ")) {
         let mut command = workspace.cargo();
-        // Without optimisation, which takes longer than it saves.
+        // Without optimisation, which would take longer than it saves.
         command.args(["install", name, "--version", &format!("={version}"), "--locked", "--debug", "--root"]);
         shell::run(command.arg(&root))
             .map_err(|error| skipped(format!("{name} {version} cannot be installed: {error}")))?;
@@ -67,14 +67,14 @@ fn tool(workspace: &Workspace, name: &str, version: &str) -> Result<Command> {
     Ok(command)
 }
 
-/// Packs every crate and builds it from its package.
+/// Packages every crate and builds it from its package.
 ///
-/// What an earlier run has unpacked and built of our own crates is removed before: Cargo takes it for the same as long as the version is.
+/// Removes packages that an earlier run has unpacked and built, because Cargo would reuse them for the same version.
 pub(crate) fn publish(workspace: &Workspace) -> Result<()> {
     let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
     let home = home.or_else(|| std::env::home_dir().map(|home| home.join(".cargo"))).unwrap_or_default();
     for registry in fs::read_dir(home.join("registry/src")).into_iter().flatten().flatten() {
-        // The registry that such a run makes up has no host, so that its name begins with a dash.
+        // The temporary registry of such a run has no host, so that its name begins with a dash.
         if registry.file_name().to_string_lossy().starts_with('-') {
             shell::remove(&registry.path())?;
         }

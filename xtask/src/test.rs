@@ -1,4 +1,4 @@
-//! The test suite, its golden images, and what takes too long for every change.
+//! The test suite, the golden images, and long-running tests.
 
 use std::process::Command;
 
@@ -8,7 +8,7 @@ use clap::Args;
 use crate::shell;
 use crate::workspace::Workspace;
 
-/// Runs tests and, without arguments, doc tests of the packages that `cargo` adds to a subcommand.
+/// Runs tests, and without arguments also doc tests, of the packages selected by `cargo`.
 pub(crate) fn suite(
     workspace: &Workspace,
     cargo: fn(&Workspace, &[&str]) -> Command,
@@ -19,7 +19,7 @@ pub(crate) fn suite(
     let is_target =
         |word: &String| ["--lib", "--bin", "--test", "--example", "--bench"].iter().any(|t| word.starts_with(t));
     if !arguments.iter().take_while(|word| *word != "--").any(is_target) {
-        // All but examples, which would be linked.
+        // Without examples, which would be linked.
         tests.arg("--tests");
     }
     shell::run(tests.arg("--no-fail-fast").args(arguments))?;
@@ -37,16 +37,16 @@ pub(crate) fn golden(workspace: &Workspace, bless: bool) -> Result<()> {
 
 #[derive(Args)]
 pub(crate) struct Torture {
-    /// Random moments at which runs are killed and then completed again, once on a disk that is full
+    /// Runs that are killed at random moments and then resumed, once on a full disk
     #[arg(long, value_name = "N", default_value_t = 1000)]
     kills: u64,
-    /// Times that inputs of every fuzz target are changed
+    /// Mutated inputs for every fuzz target
     #[arg(long, value_name = "N", default_value_t = 100_000)]
     fuzz: u64,
-    /// Tiny images, which must not need more memory than a tenth of them
+    /// Tiny images, whose generation must not need more memory than that of a tenth of them
     #[arg(long, value_name = "N", default_value_t = 100_000)]
     tiny: u64,
-    /// Windows of a slide that are put together from tiles of three sizes
+    /// Windows of a slide that are compared with tiles of three sizes
     #[arg(long, value_name = "N", default_value_t = 1000)]
     windows: u64,
 }

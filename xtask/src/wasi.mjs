@@ -1,5 +1,5 @@
-// Runs a program for wasm32-wasip1 that only writes to its standard output and error: node wasi.mjs PROGRAM
-// Node has WASI of its own, which falls over at its end in some versions.
+// Runs a wasm32-wasip1 program that only writes to standard output and error: node wasi.mjs PROGRAM
+// Some versions of Node's own WASI fail when the program exits.
 import { readFileSync, writeSync } from "node:fs";
 
 const BAD_FILE = 8;
@@ -26,7 +26,7 @@ const wasi_snapshot_preview1 = {
   environ_get: () => 0,
   args_sizes_get: (...places) => set(places),
   args_get: () => 0,
-  // Keys of hash tables in the triangulation, whose order must show nowhere: other ones each time.
+  // Random keys of hash tables in the triangulation, whose order must not affect the output.
   random_get(place, count) {
     globalThis.crypto.getRandomValues(new Uint8Array(memory.buffer, place, count));
     return 0;

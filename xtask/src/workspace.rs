@@ -1,4 +1,4 @@
-//! What Cargo knows about this workspace.
+//! The metadata of the workspace from Cargo.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -10,11 +10,11 @@ use serde::de::IgnoredAny;
 
 use crate::shell;
 
-/// Crates that take long to build, themselves or their tests: only who names them, or works with `--full`, waits for them. They are
-/// missing in the `default-members` of the workspace, too.
+/// Crates that take long to build or test. They are built only if named or with `--full`, and are not in the
+/// `default-members`.
 pub(crate) const HEAVY_CRATES: [&str; 2] = ["papsynth-python", "papsynth-zarr"];
 
-/// Features, of whatever crate, that bring along what takes long to build.
+/// Features with dependencies that take long to build.
 pub(crate) const HEAVY_FEATURES: [&str; 3] = ["cloud", "parquet", "zarr"];
 
 /// The workspace.
@@ -23,12 +23,12 @@ pub(crate) struct Workspace {
     /// The folder of the root manifest.
     #[serde(rename = "workspace_root")]
     pub(crate) root: PathBuf,
-    /// The folder that everything built goes to.
+    /// The target folder.
     #[serde(rename = "target_directory")]
     pub(crate) target: PathBuf,
     /// The members.
     pub(crate) packages: Vec<Package>,
-    /// The identities of those that Cargo builds where none is named.
+    /// Package IDs of the default members.
     #[serde(rename = "workspace_default_members")]
     pub(crate) usual: BTreeSet<String>,
 }
@@ -37,24 +37,24 @@ pub(crate) struct Workspace {
 #[derive(Deserialize)]
 pub(crate) struct Package {
     pub(crate) name: String,
-    /// As Cargo tells it from others.
+    /// Package ID.
     pub(crate) id: String,
     features: BTreeMap<String, IgnoredAny>,
     manifest_path: PathBuf,
     dependencies: Vec<Dependency>,
-    /// What it builds.
+    /// Its targets.
     pub(crate) targets: Vec<Target>,
 }
 
-/// What a member depends on in any way, tests and build scripts included.
+/// A dependency of a member, including those of tests and build scripts.
 #[derive(Deserialize)]
 struct Dependency {
     name: String,
-    /// Of members alone.
+    /// Only for members of the workspace.
     path: Option<PathBuf>,
 }
 
-/// A library, a program, a bench, …
+/// A library, program, benchmark, …
 #[derive(Deserialize)]
 pub(crate) struct Target {
     pub(crate) kind: Vec<String>,
@@ -62,20 +62,20 @@ pub(crate) struct Target {
 }
 
 impl Workspace {
-    /// Asks Cargo.
+    /// Runs `cargo metadata`.
     pub(crate) fn load() -> Result<Self> {
         let text = shell::output(cargo_command().args(["metadata", "--no-deps", "--format-version", "1"]))?;
         serde_json::from_str(&text).context("the output of `cargo metadata`")
     }
 
-    /// The Cargo that runs this program, in the root folder.
+    /// Returns a command of the Cargo that runs this program, in the root folder.
     pub(crate) fn cargo(&self) -> Command {
         let mut command = cargo_command();
         command.current_dir(&self.root);
         command
     }
 
-    /// A subcommand of Cargo, of all members but the heavy ones, with every feature but those that bring heavy ones along.
+    /// Returns a subcommand of Cargo for all members and features except the heavy ones.
     pub(crate) fn cargo_light(&self, subcommand: &[&str]) -> Command {
         let mut command = self.cargo();
         command.args(subcommand).args(["--workspace", "--features", &self.features(false)]);
@@ -83,7 +83,7 @@ impl Workspace {
         command
     }
 
-    /// A subcommand of Cargo, of [`heavy_packages`](Self::heavy_packages), with the features that bring heavy ones along.
+    /// Returns a subcommand of Cargo for [`heavy_packages`](Self::heavy_packages), with the heavy features.
     pub(crate) fn cargo_heavy(&self, subcommand: &[&str]) -> Command {
         let mut command = self.cargo();
         command.args(subcommand).args(["--features", &self.features(true)]);
@@ -91,7 +91,7 @@ impl Workspace {
         command
     }
 
-    /// The heavy members and those that one of their features brings them to.
+    /// Returns the heavy members, and those with heavy features.
     pub(crate) fn heavy_packages(&self) -> impl Iterator<Item = &str> {
         let names = self.packages.iter().filter(|package| {
             HEAVY_CRATES.contains(&&*package.name)
@@ -100,19 +100,19 @@ impl Workspace {
         names.map(|package| package.name.as_str())
     }
 
-    /// Every feature of every member that brings heavy ones along, or that does not, as Cargo reads them.
+    /// Returns all heavy or all other features, for `--features`.
     fn features(&self, heavy: bool) -> String {
         let all = self.packages.iter().flat_map(|package| package.features.keys().map(move |name| (package, name)));
         let wanted = all.filter(|(_, name)| *name != "default" && HEAVY_FEATURES.contains(&name.as_str()) == heavy);
         wanted.map(|(package, name)| format!("{}/{name}", package.name)).collect::<Vec<_>>().join(",")
     }
 
-    /// Where Cargo puts a program or an example: `folder` is that of the profile.
+    /// Returns the path of a program or example; `folder` is that of the profile.
     pub(crate) fn program(&self, folder: &str, name: &str) -> PathBuf {
         self.target.join(folder).join(format!("{name}{}", std::env::consts::EXE_SUFFIX))
     }
 
-    /// A path as a person would type it from the root folder.
+    /// Formats a path relative to the root folder.
     pub(crate) fn shown<'a>(&self, path: &'a Path) -> std::path::Display<'a> {
         path.strip_prefix(&self.root).unwrap_or(path).display()
     }
@@ -123,7 +123,7 @@ impl Package {
         self.manifest_path.parent().unwrap_or(&self.manifest_path)
     }
 
-    /// The members it depends on.
+    /// Returns the members that it depends on.
     pub(crate) fn members(&self) -> BTreeSet<&str> {
         self.dependencies.iter().filter(|known| known.path.is_some()).map(|known| known.name.as_str()).collect()
     }

@@ -19,7 +19,7 @@ const PATCH: f64 = 100.0;
 /// A pair of vertices with a distance constraint.
 pub(crate) type Pair = [u32; 2];
 
-/// A triangulated unit disc. Vertices `0..rim` lie on the circle at equal angles, the others inside.
+/// A triangulated unit disc. Vertices `0..rim` are on the circle at equal angles, the others inside.
 #[derive(Debug, Clone)]
 pub(crate) struct Disc {
     pub(crate) points: Vec<Point>,

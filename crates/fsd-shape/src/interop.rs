@@ -83,7 +83,8 @@ impl crate::ShapeModel {
 /// ```
 /// use image::{GrayImage, Luma};
 ///
-/// let mask = GrayImage::from_fn(8, 6, |x, y| Luma([if (2..6).contains(&x) && (1..4).contains(&y) { 255 } else { 0 }]));
+/// let inside = |x: u32, y: u32| (2..6).contains(&x) && (1..4).contains(&y);
+/// let mask = GrayImage::from_fn(8, 6, |x, y| Luma([if inside(x, y) { 255 } else { 0 }]));
 /// let outline = fsd_shape::trace_image(&mask, 127)?;
 /// assert!((fsd_shape::signed_area(&outline) - 12.0).abs() < 1.0);
 /// # Ok::<(), fsd_shape::Error>(())

@@ -1,5 +1,6 @@
 //! `papsynth generate`: frames with ground truth, and the time of each stage.
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
@@ -8,7 +9,7 @@ use papsynth::Threads;
 use papsynth::key::Key;
 use papsynth::profile::{Profile, Stage};
 use papsynth_dataset::memory::{MemoryEstimate, MemoryPlan};
-use papsynth_dataset::{Dataset, Error, FrameSummary, Layout, Location, Progress as Step, Run, Task};
+use papsynth_dataset::{Dataset, Error, Format, FrameSummary, Layout, Location, Progress as Step, Run, Task};
 use serde_json::json;
 
 use crate::args::{Generate, LayoutArgs, check_of};
@@ -51,10 +52,10 @@ pub(crate) fn run(args: &Generate) -> Result<(), ExitError> {
         true => (setup.threads_of_a_frame(), setup.threads),
         false => (Threads::One, workers),
     };
-    let progress = Progress::start(args, count, working, fit.bytes)?;
+    let progress = Progress::start(args, frames_of(task, &frames, layout.frames_per_shard), working, fit.bytes)?;
     let check = check_of(args.verify);
     let end = frames.end;
-    let run = Run { frames, task, workers: at_once, threads, check, stop, profile: profile.as_deref() };
+    let run = Run { frames, task, workers, threads, check, stop, profile: profile.as_deref() };
     let step = |step: Step| {
         timing.iter().for_each(|timing| timing.step(step));
         progress.step(step);
@@ -70,7 +71,10 @@ pub(crate) fn run(args: &Generate) -> Result<(), ExitError> {
     // A complete data set is not written again, so that it may lie on a read-only disk.
     // `papsynth merge` finishes the data set of several tasks.
     if task == Task::ALL && (outcome.written > 0 || args.verify || !dataset.is_finished()?) {
-        dataset.finish().map_err(|error| damaged(&error))?;
+        let summary = dataset.finish().map_err(|error| damaged(&error))?;
+        if !args.quiet && [Format::YoloSeg, Format::Huggingface].into_iter().any(|format| layout.has(format)) {
+            note_empty_splits(&summary.empty_splits);
+        }
     }
     progress.done(&outcome, task, end)?;
     match timing {
@@ -78,6 +82,25 @@ pub(crate) fn run(args: &Generate) -> Result<(), ExitError> {
         Some(timing) => exit::print(&timing.table(setup.threads)),
         None => Ok(()),
     }
+}
+
+/// Prints which splits by slide have no frames.
+fn note_empty_splits(empty: &[String]) {
+    if !empty.is_empty() {
+        exit::note(format!(
+            "no slide is in the split {}; for splits by slide, generate more frames or set slide.fields_per_slide = 1",
+            empty.join(" and ")
+        ));
+    }
+}
+
+/// The number of frames of a task, of shards with `each` frames.
+fn frames_of(task: Task, frames: &Range<u64>, each: u64) -> u64 {
+    let (first, last) = (frames.start / each, frames.end.div_ceil(each));
+    let below = |shard: u64| shard / task.total + u64::from(shard % task.total > task.index);
+    let is_last = last > first && (last - 1) % task.total == task.index;
+    let missing = if is_last { last.saturating_mul(each).saturating_sub(frames.end) } else { 0 };
+    (below(last) - below(first)).saturating_mul(each).saturating_sub(missing)
 }
 
 /// The parallelism that fits into memory. `few` is the number of shards if it is below the number of threads.
@@ -163,5 +186,19 @@ impl Timing {
             "event": "profile", "threads": threads, "stages": stages,
             "frames_per_s": frames, "pixels_per_s": pixels, "objects_per_s": objects,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_frames_of_all_tasks_are_all_frames() {
+        for (frames, each, total) in [(0..7, 2, 4), (0..7, 2, 1), (4..9, 2, 3), (0..5, 1, 2), (0..3, 256, 4)] {
+            let of = |index| frames_of(Task { index, total }, &frames, each);
+            assert_eq!((0..total).map(of).sum::<u64>(), frames.end - frames.start, "{frames:?} {each} {total}");
+        }
+        assert_eq!(frames_of(Task { index: 3, total: 4 }, &(0..7), 2), 1);
     }
 }

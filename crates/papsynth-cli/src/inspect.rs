@@ -51,11 +51,8 @@ fn table(dir: &str, overview: &Overview) -> String {
         let merged = counted(overview.manifest.frames, "frame", "frames");
         row("merged", &format!("{merged}; `papsynth merge` adds the rest to objects.csv and coco.json"));
     }
-    for defect in overview.damaged_shards.iter().take(MAX_LISTED) {
-        row("damaged", &format!("shard {}: {}", defect.shard, defect.message));
-    }
-    for flaw in &overview.damaged_files {
-        row("damaged", flaw);
+    for finding in overview.damaged_shards.iter().take(MAX_LISTED).chain(&overview.damaged_files) {
+        row("damaged", &finding.to_string());
     }
     if overview.frames > 0 {
         let sizes = listed(overview.sizes.iter().map(|[width, height]| format!("{width} x {height} px")));

@@ -36,7 +36,7 @@ use std::process::ExitCode;
 
 use papsynth::recipe::{Preset, Recipe};
 
-use args::{Cli, Init, Verb};
+use args::{Init, Verb};
 use exit::ExitError;
 use output_file::{Kind, OutputFile};
 
@@ -102,7 +102,7 @@ fn run(verb: Verb) -> Result<(), ExitError> {
         }
         #[cfg(feature = "completions")]
         Verb::Completions(args) => {
-            let (mut command, mut script) = (<Cli as clap::CommandFactory>::command(), Vec::new());
+            let (mut command, mut script) = (<args::Cli as clap::CommandFactory>::command(), Vec::new());
             clap_complete::generate(args.shell, &mut command, "papsynth", &mut script);
             exit::print(&String::from_utf8_lossy(&script))
         }

@@ -115,8 +115,8 @@ fn summary(fit: &Fit) -> String {
         "\ndistance to the real windows, in standard errors: {:.2} before, {:.2} after the estimate, {:.2} after the search\n",
         d.before, d.estimated, d.after
     ));
-    let mut worst: Vec<_> = fit.statistics.iter().filter(|s| s.apart.is_finite()).collect();
-    worst.sort_by(|a, b| b.apart.abs().total_cmp(&a.apart.abs()));
+    let mut worst: Vec<_> = fit.statistics.iter().filter(|s| s.standard_errors.is_finite()).collect();
+    worst.sort_by(|a, b| b.standard_errors.abs().total_cmp(&a.standard_errors.abs()));
     text.push_str("largest differences:\n");
     for s in worst.iter().take(MAX_PRINTED) {
         text.push_str(&format!(

@@ -53,8 +53,8 @@ impl Limits {
     }
 }
 
-/// How a run fits into its budget: with at most `at_once` frames side by side. `too_large` is the error for a budget
-/// that is too small for one frame.
+/// How a run fits into its budget: with at most `workers` frames at the same time. `too_large` is the error for a
+/// budget that is too small for one frame.
 pub(crate) fn fit(
     need: &MemoryEstimate,
     threads: usize,
@@ -67,11 +67,11 @@ pub(crate) fn fit(
     let all_on_one = if shared { need.plan(1, true, bytes(threads)).filter(|fit| fit.shared) } else { None };
     // Each thread reserves addresses, so that fewer threads have a larger budget.
     let separate = |frames: usize| need.plan(frames, false, bytes(frames)).filter(|fit| fit.workers == frames);
-    let Some(fit) = all_on_one.or_else(|| (1..=at_once).rev().find_map(separate)) else {
+    let Some(fit) = all_on_one.or_else(|| (1..=workers).rev().find_map(separate)) else {
         let budget = limits.budget(1);
         return Err(too_large(budget.unwrap_or(Budget { bytes: 0, source: "the available memory" })));
     };
-    if (fit.workers, fit.shared) != (at_once, shared)
+    if (fit.workers, fit.shared) != (workers, shared)
         && let Some(Budget { bytes, source }) = limits.budget(fit.workers)
     {
         let (used, may) = (fit.workers, format_bytes(bytes as f64));

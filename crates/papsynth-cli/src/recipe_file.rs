@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use papsynth::model::Model;
-use papsynth::recipe::diagnose::{self, Fault, Schema};
+use papsynth::recipe::diagnose::{self, FieldError, Schema};
 use papsynth::recipe::{Preset, Recipe};
 use toml::{Table, Value};
 
@@ -91,7 +91,7 @@ impl RecipeFile {
     /// An error in one field, with its location.
     pub(crate) fn report(&self, field: &str, message: String) -> ErrorReport {
         let path = field.split('.').map(str::to_owned).collect();
-        self.sources.located(Fault { path, span: None, message, help: None })
+        self.sources.located(FieldError { path, span: None, message, help: None })
     }
 
     /// An error of the engine, with the locations of its fields.
@@ -112,7 +112,7 @@ impl RecipeFile {
             let path: Vec<String> = field.split('.').map(str::to_owned).collect();
             let meaning =
                 schema.at(&path).and_then(|section| section.meaning()).map(|m| format!("meaning of the field: {m}"));
-            Fault { path, span: None, message, help: meaning }
+            FieldError { path, span: None, message, help: meaning }
         });
         ExitError::from(self.sources.report(faults.collect(), heading))
     }
@@ -133,11 +133,11 @@ fn read(path: &Path, expected: &str) -> Result<(Recipe, (String, Arc<String>)), 
 
 impl Sources {
     /// Applies every `--set` to a recipe, in their order.
-    fn overlay(&self, base: Recipe) -> Result<Recipe, Vec<Fault>> {
+    fn overlay(&self, base: Recipe) -> Result<Recipe, Vec<FieldError>> {
         if self.sets.is_empty() {
             return Ok(base);
         }
-        let fault = |message: String| vec![Fault { path: Vec::new(), span: None, message, help: None }];
+        let fault = |message: String| vec![FieldError { path: Vec::new(), span: None, message, help: None }];
         let mut table: Table = toml::from_str(&base.to_toml()).map_err(|e| fault(e.to_string()))?;
         for set in &self.sets {
             // `cells` replaces all classes; a field of one class changes only this field.
@@ -148,11 +148,11 @@ impl Sources {
         }
         let text = toml::to_string(&table).map_err(|e| fault(e.to_string()))?;
         // The user does not see this text, so only the paths of the fields are kept.
-        diagnose::read(&text).map_err(|faults| faults.into_iter().map(|f| Fault { span: None, ..f }).collect())
+        diagnose::read(&text).map_err(|faults| faults.into_iter().map(|f| FieldError { span: None, ..f }).collect())
     }
 
     /// Errors with their locations: the last `--set` of the field, or the file.
-    fn report(&self, faults: Vec<Fault>, heading: &str) -> ErrorReport {
+    fn report(&self, faults: Vec<FieldError>, heading: &str) -> ErrorReport {
         let heading = format!("{} {heading}", faults.len());
         let more = faults.len().saturating_sub(MAX_FAULTS);
         let mut reports: Vec<_> = faults.into_iter().take(MAX_FAULTS).map(|f| self.located(f)).collect();
@@ -162,7 +162,7 @@ impl Sources {
         ErrorReport::all(heading, reports)
     }
 
-    fn located(&self, fault: Fault) -> ErrorReport {
+    fn located(&self, fault: FieldError) -> ErrorReport {
         let report = |message: String| match &fault.help {
             Some(help) => ErrorReport::new(message).help(help),
             None => ErrorReport::new(message),
@@ -240,7 +240,8 @@ fn merge(base: &mut Table, over: &Table) {
             (Some(Value::Table(inner)), Value::Table(over)) => {
                 let is_distribution = DISTRIBUTIONS.iter().any(|name| over.contains_key(*name));
                 let is_other_kind = over.get("kind").is_some_and(|kind| inner.get("kind") != Some(kind));
-                if is_distribution || is_other_kind {
+                let is_density = over.contains_key("per_mm2") && !inner.contains_key("per_mm2");
+                if is_distribution || is_density || is_other_kind {
                     *inner = over.clone();
                 } else {
                     merge(inner, over);
@@ -278,6 +279,13 @@ mod tests {
         let recipe = load(Preset::Lbc, &["layout.kind=uniform", "slide.depth_um={ normal = [4, 0.5] }"]).unwrap();
         assert_eq!(recipe.layout, Layout::Uniform {});
         assert_eq!(recipe.slide.depth_um, Number::normal(4.0, 0.5));
+        for count in ["20", "{ uniform = [1, 4] }", "{ per_mm2 = 120 }", "{ per_mm2 = { uniform = [1, 4] } }"] {
+            let sets = [format!("cells.intermediate.count={count}")];
+            for preset in [Preset::Lbc, Preset::Paper2015] {
+                let recipe = load(preset, &[&sets[0]]).unwrap();
+                assert_eq!(recipe.cells["intermediate"].count.to_string(), count);
+            }
+        }
         let sets = ["layout.kind=band", "layout.width_um=50", "layout.outside=0.1"];
         let band = Layout::Band(papsynth::recipe::Band { width_um: 50.0.into(), outside: 0.1.into() });
         assert_eq!(load(Preset::Lbc, &sets).unwrap().layout, band);
@@ -293,17 +301,17 @@ mod tests {
     fn faults_point_at_the_argument() {
         for (set, expected) in [
             ("field.widht_px=96", "did you mean `width_px`"),
-            ("field.width_px=-3", "field.width_px: -3 is outside 16 to 32768"),
+            ("field.width_px=-3", "field.width_px: -3 is out of range: expected 16 to 32768"),
             ("field.width_px=nan", "field.width_px: NaN"),
             ("field.width_px=wide", "is a text"),
             ("field.width_px", "expected FIELD=VALUE"),
             ("field.width_px=", "--set"),
             ("=3", "--set"),
             ("field.width_px=[1,", "--set"),
-            ("field=3", "field: 3 is a whole number"),
+            ("field=3", "field: expected a table, found an integer"),
             ("layout.kind=map", "missing field"),
-            ("camera.bits=8.5", "not a whole number"),
-            ("layout.kind=lumps", "layout.kind: `lumps` is not known"),
+            ("camera.bits=8.5", "is not an integer"),
+            ("layout.kind=lumps", "layout.kind: unknown value \"lumps\""),
             ("version=2", "version 2"),
             ("cytoplasm.sheet=xpdb", "did you mean `xpbd`"),
         ] {

@@ -76,7 +76,7 @@ impl Setup {
 
 /// A run of all these frames with this many frames at the same time, each on one thread.
 pub(crate) fn run_of(frames: Range<u64>, workers: usize, stop: &AtomicBool) -> Run<'_> {
-    let (task, threads, check) = (Share::ALL, Threads::One, Check::Sizes);
+    let (task, threads, check) = (Task::ALL, Threads::One, Check::Sizes);
     Run { frames, task, workers, threads, check, stop, profile: None }
 }
 

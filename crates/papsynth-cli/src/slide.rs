@@ -9,7 +9,7 @@ use crate::setup::Setup;
 #[cfg(feature = "zarr")]
 mod set;
 #[cfg(feature = "zarr")]
-pub(crate) use set::{there, verify};
+pub(crate) use set::{progress_of, verify};
 
 /// Pixels of a tile at most.
 const MAX_TILE_PIXELS: u64 = 1 << 28;

@@ -4,6 +4,7 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
+use papsynth::key::Key;
 use papsynth_dataset::{Dataset, image_paths, write_file};
 
 use crate::args::Sweep;
@@ -48,6 +49,10 @@ pub(crate) fn run(args: &Sweep) -> Result<(), ExitError> {
     let combinations = combinations(&axes);
     let setups = combinations.iter().map(|values| setup(args, &axes, values)).collect::<Result<Vec<_>, _>>()?;
     check_out(&args.out, count)?;
+    for setup in &setups {
+        let key = Key { seed: args.engine.seed, index: 0 };
+        setup.engine.scene(key).map_err(|error| setup.recipe.error(&error))?;
+    }
     let frames = 0..args.frames;
     let stop = exit::stop_flag()?;
     let mut table = csv::Writer::from_writer(Vec::new());

@@ -100,7 +100,7 @@ fn announcement(session: &Session, server: &Server) -> String {
 }
 
 fn results(summary: &Summary) -> String {
-    tables([&summary.row, &summary.random], summary.claim.trials, "", &summary.breakdown)
+    tables([&summary.row, &summary.random], summary.precision.trials, "", &summary.breakdown)
 }
 
 fn tables<'a>(rows: impl IntoIterator<Item = &'a Row>, trials: u64, means: &str, breakdown: &[Group]) -> String {
@@ -137,5 +137,5 @@ fn pooled(folder: &std::path::Path, as_json: bool) -> Result<(), ExitError> {
         true => String::new(),
         false => format!("Means over subjects with 95 % intervals (Student's t): {}.\n", means.join(", ")),
     };
-    exit::print(&tables(rows, pool.claim.trials, &means, &pool.breakdown))
+    exit::print(&tables(rows, pool.precision.trials, &means, &pool.breakdown))
 }

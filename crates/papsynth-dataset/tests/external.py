@@ -1,9 +1,9 @@
-"""Checks a data set with readers that are not ours.
+"""Checks a data set with independent readers.
 
 Usage: python external.py DIR
 
-Needs numpy, pillow, tifffile, pycocotools; ome-types is used where it is installed. Prints a line for each check and
-ends with status 1 at the first that fails.
+Needs numpy, pillow, tifffile, pycocotools; ome-types is optional. Prints a line for each check and exits with
+status 1 at the first failure.
 """
 
 import csv
@@ -28,7 +28,7 @@ GROUPS = {"cytoplasm": "cytoplasm", "nucleus": "nucleus", "whole": "debris"}
 
 
 def check(condition, message):
-    """Ends the program unless the condition holds."""
+    """Exits unless the condition holds."""
     if not condition:
         print(f"FAILED: {message}")
         sys.exit(1)
@@ -47,13 +47,13 @@ def read_json(path):
 
 
 def own_sha256(text, key):
-    """SHA-256 of a JSON document without white space in which the value of `key`, its own SHA-256, is empty."""
+    """Returns the SHA-256 of a JSON document without white space, with an empty value of `key`."""
     compact = re.sub(r'("(?:[^"\\]|\\.)*")|\s+', lambda match: match[1] or "", text)
     return hashlib.sha256(re.sub(rf'"{key}":"[0-9a-f]*"}}$', f'"{key}":""}}', compact).encode()).hexdigest()
 
 
 def check_manifest(folder):
-    """Every file is listed, and is as listed; returns manifest and records."""
+    """Compares all files with the manifest; returns manifest and records."""
     text = (folder / "manifest.json").read_text()
     manifest = json.loads(text)
     equal("manifest format", manifest["format"], "papsynth-dataset")
@@ -89,8 +89,8 @@ def check_manifest(folder):
     equal("number of frames", sum(len(record["frames"]) for record in records), manifest["frames"])
     shared = {name for name, entry in listed.items() if "shard" not in entry}
     for name in ["README.md", "croissant.json", "splits.csv", "contact-sheet.png", "recipe.toml", "model.json"]:
-        check(name in shared, f"{name} is not among the files of the whole data set")
-    passed(f"manifest: {len(listed)} files of the right size and SHA-256, none beside them")
+        check(name in shared, f"{name} is not listed as a file of the data set")
+    passed(f"manifest: {len(listed)} files with the listed size and SHA-256, no other files")
     return manifest, records
 
 
@@ -98,7 +98,7 @@ def check_stack(path, frame):
     """OME-TIFF: axes, sizes, pixel size, step, type."""
     planes, height, width = len(frame["planes_um"]), frame["height"], frame["width"]
     with tifffile.TiffFile(path) as file:
-        check(file.is_ome, f"{path} is no OME-TIFF for tifffile")
+        check(file.is_ome, f"{path} is not an OME-TIFF for tifffile")
         equal(f"pages of {path}", len(file.pages), planes)
         series = file.series[0]
         colour = frame["channels"] == 3
@@ -121,8 +121,24 @@ def check_stack(path, frame):
     return stack
 
 
+def check_preview(folder, frame, picture):
+    """Checks the 8-bit preview of an image with more bits."""
+    path = folder / "preview" / f"{frame['index']:06}.png"
+    equal(f"training_bits of frame {frame['index']}", frame["training_bits"], min(frame["bits"], 8))
+    equal(f"existence of {path}", path.exists(), frame["bits"] > 8)
+    if not path.exists():
+        return
+    with Image.open(path) as image:
+        preview = np.array(image)
+    equal(f"type of {path}", preview.dtype, np.dtype("u1"))
+    equal(f"shape of {path}", preview.shape, picture.shape)
+    if frame["channels"] == 1:
+        scaled = np.rint(picture * (255 / (2 ** frame["bits"] - 1)))
+        check(np.array_equal(preview, scaled), f"{path} is not the image at 8 bits")
+
+
 def check_images(folder, frame):
-    """All pictures of a frame open and have its shape; returns its label images."""
+    """Checks type and shape of all images of a frame; returns its label images."""
     name, shape = f"{frame['index']:06}", (frame["height"], frame["width"])
     pixels = shape if frame["channels"] == 1 else (*shape, 3)
     white = 2 ** frame["bits"] - 1
@@ -133,9 +149,10 @@ def check_images(folder, frame):
         image.load()
         picture = np.array(image)
     equal(f"shape of {flat}", picture.shape, pixels)
-    # Pillow reads 16-bit colour as 8 bits.
+    # Pillow truncates 16-bit colour to 8 bits.
     equal(f"type of {flat}", picture.dtype, np.dtype(grey if frame["channels"] == 1 else "u1"))
     check(picture.max() <= white, f"{flat} exceeds {frame['bits']} bits")
+    check_preview(folder, frame, picture)
     if planes > 1:
         stack = check_stack(folder / "images" / f"{name}.ome.tif", frame)
     else:
@@ -143,11 +160,11 @@ def check_images(folder, frame):
     floats = tifffile.imread(folder / "noise-free" / f"{name}.tif").reshape(planes, *pixels)
     equal(f"type of noise-free/{name}.tif", floats.dtype, np.dtype("f4"))
     check(np.isfinite(floats).all(), f"noise-free/{name}.tif is not finite")
-    # Noise has no mean: over a whole plane it all but vanishes, unless pixels are saturated.
+    # The mean of the noise over a plane is nearly 0, except for saturated pixels.
     clipped = np.clip(floats, 0, white)
     own = tuple(range(1, stack.ndim))
     off = np.abs(stack.astype(float).mean(axis=own) - clipped.mean(axis=own))
-    check((off < 0.02 * white + 0.5).all(), f"{name}: planes are {off} grey levels from their noise-free twins")
+    check((off < 0.02 * white + 0.5).all(), f"{name}: planes are {off} grey levels from the noise-free planes")
     labels = {}
     for kind in ["cytoplasm", "nucleus", "debris", "layers"]:
         path = folder / "labels" / kind / f"{name}.tif"
@@ -159,7 +176,7 @@ def check_images(folder, frame):
 
 
 def check_objects(coco, rows, frame, labels):
-    """Masks, table and label images say the same."""
+    """Compares masks, table and label images."""
     index = frame["index"]
     annotations = coco.loadAnns(coco.getAnnIds(imgIds=[index]))
     equal(f"objects of frame {index} in coco.json and objects.csv", len(annotations), len(rows))
@@ -173,19 +190,19 @@ def check_objects(coco, rows, frame, labels):
         category = coco.cats[annotation["category_id"]]
         counts[category["name"]] = counts.get(category["name"], 0) + 1
         equal(f"group of {name}", category["supercategory"], GROUPS[row["part"]])
-        whole, front = coco.annToMask(annotation), rle.decode(annotation["visible"])
+        complete, visible = coco.annToMask(annotation), rle.decode(annotation["visible"])
         for what, found in [
             ("pycocotools' area", int(rle.area(annotation["segmentation"]))),
-            ("sum of the mask", int(whole.sum())),
+            ("sum of the mask", int(complete.sum())),
             ("area_px", int(row["area_px"])),
         ]:
             equal(f"{what} of {name}", found, annotation["area"])
-        equal(f"visible_area_px of {name}", int(row["visible_area_px"]), int(front.sum()))
-        check(not (front & ~whole).any(), f"front of {name} leaves its mask")
+        equal(f"visible_area_px of {name}", int(row["visible_area_px"]), int(visible.sum()))
+        check(not (visible & ~complete).any(), f"visible mask of {name} is not within its complete mask")
         box = [int(row[f"bbox_{side}_px"] or 0) for side in ["x", "y", "width", "height"]]
         equal(f"bbox of {name}", annotation["bbox"], box)
         equal(f"pycocotools' bbox of {name}", [int(v) for v in rle.toBbox(annotation["segmentation"])], box)
-        y, x = np.nonzero(whole)
+        y, x = np.nonzero(complete)
         centroid = [float(row["centroid_x_px"]), float(row["centroid_y_px"])]
         check(np.allclose(centroid, [x.mean(), y.mean()], atol=1e-6), f"centroid of {name}: {centroid}")
         for column in ["defocus_um", "detectability"]:
@@ -193,13 +210,13 @@ def check_objects(coco, rows, frame, labels):
         values = [float(v) for v in row["detectability"].split(";")]
         equal(f"best_plane of {name}", int(row["best_plane"]), int(np.argmax(values)))
         group = GROUPS[row["part"]]
-        check(not drawn[group][front > 0].any(), f"front of {name} overlaps another of its group")
-        drawn[group][front > 0] = annotation["object_id"]
+        check(not drawn[group][visible > 0].any(), f"visible mask of {name} overlaps another of its group")
+        drawn[group][visible > 0] = annotation["object_id"]
         if row["part"] == "cytoplasm":
-            layers += whole
+            layers += complete
     for kind, picture in drawn.items():
-        check(np.array_equal(picture, labels[kind]), f"fronts of frame {index} are not labels/{kind}")
-    check(np.array_equal(layers, labels["layers"]), f"masks of frame {index} are not labels/layers")
+        check(np.array_equal(picture, labels[kind]), f"visible masks of frame {index} differ from labels/{kind}")
+    check(np.array_equal(layers, labels["layers"]), f"masks of frame {index} differ from labels/layers")
     equal(f"counts of frame {index}", counts, frame["objects"])
 
 
@@ -216,7 +233,7 @@ def main(folder):
     for frame in (frame for record in records for frame in record["frames"]):
         image = coco.imgs[frame["index"]]
         saturated = [int(rle.area(mask)) for mask in image.get("saturated", [])]
-        equal(f"saturated pixels of frame {frame['index']}", saturated or [0] * len(frame["planes_um"]), frame["saturated"])
+        equal(f"saturated pixels of frame {frame['index']}", saturated or [0] * len(frame["planes_um"]), frame["saturated_px"])
         check((folder / image["file_name"]).exists(), f"{image['file_name']} is missing")
         equal(f"size of frame {frame['index']}", [image["width"], image["height"]], [frame["width"], frame["height"]])
         labels = check_images(folder, frame)

@@ -1,11 +1,11 @@
-"""Checks every format of a data set with readers that are not ours: against each other, and against the masks in
-shards/*.coco.json, from which all labels follow.
+"""Checks every format of a data set with independent readers: against each other, and against the masks in
+shards/*.coco.json.
 
 Usage: python external_formats.py DIR [PAGES]
 
-DIR holds all formats at once. PAGES is the folder of the pages on formats (docs/formats), whose Python is run.
+DIR is a data set with all formats. PAGES is the folder docs/formats; the Python code of its pages is run.
 Needs numpy, pillow, tifffile, imagecodecs, ome-types, lxml, pycocotools, webdataset, shapely. Prints a line for each check
-and ends with status 1 at the first that fails.
+and exits with status 1 at the first failure.
 """
 
 import contextlib
@@ -33,12 +33,12 @@ from shapely.geometry import shape
 
 from external import GROUPS, check, check_manifest, equal, passed, read_json
 
-# Those that segmenters are trained for.
+# Groups of the formats for segmenters.
 FLAT = ["cytoplasm", "nucleus"]
 
 
 def same(what, found, expected):
-    """Ends the program unless two arrays are equal in shape, type and every value."""
+    """Exits unless two arrays have equal shape and values."""
     equal(f"shape of {what}", found.shape, expected.shape)
     check(np.array_equal(found, expected), f"{what}: {np.count_nonzero(found != expected)} values differ")
 
@@ -51,12 +51,12 @@ class Object:
         self.group = GROUPS[annotation["part"]]
         self.id = annotation["object_id"]
         self.mask = rle.decode(annotation["segmentation"]).astype(bool)
-        self.front = rle.decode(annotation["visible"]).astype(bool)
+        self.visible = rle.decode(annotation["visible"]).astype(bool)
         self.name = f"object {self.id} ({annotation['part']}) of frame {annotation['image_id']}"
 
 
 class Frame:
-    """A frame: what its record says, and its truth."""
+    """A frame: its record and ground truth."""
 
     def __init__(self, folder, record, summary, coco):
         self.folder, self.shard, self.summary, self.coco = folder, record["shard"], summary, coco
@@ -70,11 +70,11 @@ class Frame:
         return [one for one in self.objects if one.group == group]
 
     def labels(self, group, policy):
-        """One label a pixel."""
+        """Returns the labels of a group, one per pixel."""
         labels = np.zeros(self.shape, np.int64)
         if policy == "top":
             for one in self.of(group):
-                labels[one.front] = one.id
+                labels[one.visible] = one.id
             return labels
         covered = np.zeros(self.shape, int)
         for one in sorted(self.of(group), key=lambda one: one.id):
@@ -85,23 +85,28 @@ class Frame:
         return labels
 
     def picture(self):
-        """The image or, of a stack, the one with everything in focus."""
+        """Returns the image; of a stack, the all-in-focus image."""
         path = self.folder / ("images" if self.planes == 1 else "all-in-focus") / f"{self.name}.png"
-        # Pillow reads 16-bit colour as 8 bits.
+        # Pillow truncates 16-bit colour to 8 bits.
         return imagecodecs.png_decode(path.read_bytes())
 
     def stack(self):
-        """All planes."""
+        """Returns all planes."""
         if self.planes == 1:
             return self.picture()[None]
         return tifffile.imread(self.folder / "images" / f"{self.name}.ome.tif")
 
+    def at_8_bits(self, levels):
+        """Returns the levels as formats for training have them."""
+        bits = self.summary["bits"]
+        return np.rint(levels * (255 / (2**bits - 1))).astype(np.uint8) if bits > 8 else levels
+
 
 def check_truth(folder, records):
-    """COCO of the shards by pycocotools; returns all frames."""
+    """Reads COCO of the shards with pycocotools; returns all frames."""
     frames, objects = [], 0
     for record in records:
-        # pycocotools says how long it takes.
+        # pycocotools prints its time.
         with contextlib.redirect_stdout(None):
             coco = COCO(folder / f"shards/{record['shard']:06}.coco.json")
         equal(f"images of shard {record['shard']}", sorted(coco.imgs), [f["index"] for f in record["frames"]])
@@ -124,27 +129,27 @@ def check_truth(folder, records):
             if annotation["area"]:
                 y, x = np.nonzero(one.mask)
                 check(np.allclose(annotation["centroid"], [x.mean(), y.mean()], atol=1e-6), f"centroid of {one.name}")
-            check(not (one.front & ~one.mask).any(), f"front of {one.name} leaves its mask")
+            check(not (one.visible & ~one.mask).any(), f"visible mask of {one.name} is not within its complete mask")
             parent = annotation["parent_id"]
             if parent is not None:
                 cell = frame.coco.anns[parent]
                 equal(f"parent of {one.name}", [cell["object_id"], cell["part"]], [one.id, "cytoplasm"])
         for group in GROUPS.values():
-            # The nearest lies in front; of equal ones that with the larger id.
+            # The object nearest to the objective is visible; at equal depths, that with the larger id.
             order = sorted(frame.of(group), key=lambda one: (one.annotation["depth_um"], one.id))
             nearest = np.zeros(frame.shape, np.int64)
             for one in order:
                 nearest[one.mask] = one.id
-            same(f"front-most {group} of frame {frame.index} by depth", frame.labels(group, "top"), nearest)
+            same(f"visible {group} of frame {frame.index} by depth", frame.labels(group, "top"), nearest)
             masks = sum(int(one.mask.sum()) for one in frame.of(group))
-            lost = masks - int(np.count_nonzero(frame.labels(group, frame.policy)))
-            equal(f"pixels of {group} lost in frame {frame.index}", frame.summary["occluded_px"][group], lost)
-    passed(f"shards/*.coco.json: pycocotools gives back every mask, area and box of {objects} objects in {len(frames)} frames")
+            occluded = masks - int(np.count_nonzero(frame.labels(group, frame.policy)))
+            equal(f"occluded pixels of {group} in frame {frame.index}", frame.summary["occluded_px"][group], occluded)
+    passed(f"shards/*.coco.json: pycocotools reads every mask, area and box of {objects} objects in {len(frames)} frames")
     return frames
 
 
 def check_tables(folder, frames, records):
-    """objects/*.csv row by row as the annotations."""
+    """Compares objects/*.csv with the annotations, row by row."""
     count = 0
     for record in records:
         with open(folder / f"objects/{record['shard']:06}.csv", newline="") as file:
@@ -161,11 +166,11 @@ def check_tables(folder, frames, records):
             for key in ["defocus_um", "detectability"]:
                 equal(f"{key} of {one.name}", [float(v) for v in row[key].split(";")], annotation[key])
             count += 1
-    passed(f"objects/*.csv: {count} rows say what the annotations say")
+    passed(f"objects/*.csv: {count} rows equal the annotations")
 
 
 def split(seed, what, number):
-    """Eight in ten to train with, one to tune, one to test, by the number alone."""
+    """Returns the split with probabilities 0.8, 0.1 and 0.1."""
     word = hashlib.sha256(f"papsynth split {seed} {what} {number}".encode()).digest()[:4]
     return (["train"] * 8 + ["val", "test"])[int.from_bytes(word, "little") * 10 >> 32]
 
@@ -188,14 +193,14 @@ def check_splits(folder, frames, seed):
 
 
 def check_folder(frames):
-    """Pillow and tifffile: images and label images."""
+    """Reads images and label images with Pillow and tifffile."""
     for frame in frames:
         path = frame.folder / ("images" if frame.planes == 1 else "all-in-focus") / f"{frame.name}.png"
         with Image.open(path) as image:
             image.load()
             equal(f"size of {path}", image.size, frame.shape[::-1])
             per_metre = 1e6 / frame.summary["pixel_um"]
-            # Pillow says it in pixels per inch.
+            # Pillow gives pixels per inch.
             check(np.allclose(image.info["dpi"], per_metre * 0.0254, rtol=1e-5), f"pHYs of {path}: {image.info['dpi']}")
             if frame.summary["bits"] <= 8 or not frame.colour:
                 same(f"{path} by Pillow and by libpng", np.array(image), frame.picture())
@@ -209,9 +214,9 @@ def check_folder(frames):
 
 
 def check_ome(path, frame, planes, channels):
-    """Schema, sizes, axes and units of an OME-TIFF; returns its pixels and its model."""
+    """Checks schema, sizes, axes and units of an OME-TIFF; returns its pixels and its model."""
     with tifffile.TiffFile(path) as file:
-        check(file.is_ome, f"{path} is no OME-TIFF for tifffile")
+        check(file.is_ome, f"{path} is not an OME-TIFF for tifffile")
         xml = file.ome_metadata
         equal(f"series of {path}", len(file.series), 1)
         series = file.series[0]
@@ -230,8 +235,8 @@ def check_ome(path, frame, planes, channels):
         equal(f"physical size {key} of {path}", getattr(typed, f"physical_size_{key}"), frame.summary["pixel_um"])
         equal(f"unit of {key} of {path}", getattr(typed, f"physical_size_{key}_unit").value, "µm")
     equal(f"samples of {path}", sum(channel.samples_per_pixel for channel in typed.channels), channels)
-    wanted = ("Z" if planes > 1 else "") + ("C" if channels > 1 and not colour else "") + "YX" + ("S" if colour else "")
-    equal(f"axes of {path}", axes, wanted)
+    expected_axes = ("Z" if planes > 1 else "") + ("C" if channels > 1 and not colour else "") + "YX" + ("S" if colour else "")
+    equal(f"axes of {path}", axes, expected_axes)
     return pixels, typed
 
 
@@ -258,17 +263,17 @@ def check_ome_tiff(frames):
                 shown = [np.array_equal(layer == one.id, one.mask) for layer in pixels]
                 hidden = [not (layer == one.id).any() for layer in pixels]
                 if one.mask.any():
-                    equal(f"layers of {path} that show {one.name} whole", sum(shown), 1)
+                    equal(f"layers of {path} with all of {one.name}", sum(shown), 1)
                     equal(f"layers of {path} without {one.name}", sum(hidden), count - 1)
                     area = max(int((layer == one.id).sum()) for layer in pixels)
                     equal(f"area of {one.name} in {path}", area, int(rle.area(one.annotation["segmentation"])))
             known = {one.id for one in frame.of(group)} | {0}
-            check(set(np.unique(pixels).tolist()) <= known, f"{path} shows objects that there are not")
-    passed(f"ome-tiff: schema, axes, µm and pixels of {len(frames)} images; {layers} label layers hold every mask whole")
+            check(set(np.unique(pixels).tolist()) <= known, f"{path} has unknown objects")
+    passed(f"ome-tiff: schema, axes, µm and pixels of {len(frames)} images; {layers} label layers have every complete mask")
 
 
 def keep(key, data):
-    """Decodes PNG and TIFF as they are: webdataset's own decoders of images know 8 bits only."""
+    """Decodes PNG and TIFF without conversion: the image decoders of webdataset return 8 bits."""
     if key.endswith("png"):
         return imagecodecs.png_decode(data)
     if key.endswith("tif"):
@@ -286,10 +291,10 @@ def check_webdataset(folder, frames, records, splits):
         images = {"png"} if frame.planes == 1 else {"ome.tif", "all-in-focus.png"}
         equal(f"parts of {name}", keys, {"json", *images, *(f"{group}.png" for group in FLAT)})
         if frame.planes == 1:
-            same(f"png of {name}", sample["png"], frame.picture())
+            same(f"png of {name}", sample["png"], frame.at_8_bits(frame.picture()))
         else:
-            same(f"ome.tif of {name}", sample["ome.tif"], frame.stack())
-            same(f"all-in-focus.png of {name}", sample["all-in-focus.png"], frame.picture())
+            same(f"ome.tif of {name}", sample["ome.tif"], frame.at_8_bits(frame.stack()))
+            same(f"all-in-focus.png of {name}", sample["all-in-focus.png"], frame.at_8_bits(frame.picture()))
         for group in FLAT:
             equal(f"type of {group}.png of {name}", sample[f"{group}.png"].dtype, np.dtype("u2"))
             same(f"{group}.png of {name}", sample[f"{group}.png"].astype(np.int64), frame.labels(group, frame.policy))
@@ -307,24 +312,24 @@ def check_webdataset(folder, frames, records, splits):
             for key in one.annotation.keys() - ids:
                 expected = one.annotation[key]
                 equal(f"{key} of {one.name} in {name}", found[key], expected)
-    # Without a word of ours: 8 bits are what its own decoder gives.
-    if frames[0].planes == 1 and frames[0].summary["bits"] == 8:
+    # The decoder of webdataset reads images as they are.
+    if frames[0].planes == 1:
         own = next(iter(webdataset.WebDataset(urls, shardshuffle=False).decode("rgb8")))
-        picture = frames[0].picture()
+        picture = frames[0].at_8_bits(frames[0].picture())
         same("png by webdataset's own decoder", own["png"], picture if frames[0].colour else np.dstack([picture] * 3))
-    passed(f"webdataset: {len(samples)} samples in {len(urls)} tar files, pixels, labels and truth as elsewhere")
+    passed(f"webdataset: {len(samples)} samples in {len(urls)} tar files, pixels, labels and ground truth as in other formats")
 
 
 def check_pairs(what, frame, group, image, masks):
-    """An image and its labels, each object of which is one that there is."""
-    same(f"{what} of frame {frame.index}", tifffile.imread(image), frame.picture())
+    """Checks an image and its labels."""
+    same(f"{what} of frame {frame.index}", tifffile.imread(image), frame.at_8_bits(frame.picture()))
     labels = tifffile.imread(masks)
-    check(labels.dtype in (np.uint16, np.uint32), f"{masks} is of {labels.dtype}")
+    check(labels.dtype in (np.uint16, np.uint32), f"{masks} has the type {labels.dtype}")
     same(str(masks), labels.astype(np.int64), frame.labels(group, frame.policy))
 
 
 def check_cellpose(folder, frames):
-    """Cellpose's rules: each image whose name does not end in `_masks`, with `NAME_masks` beside it (cellpose.io)."""
+    """Checks the rules of Cellpose: each image whose name does not end in `_masks` has a `NAME_masks` (cellpose.io)."""
     for group in FLAT:
         here = folder / "cellpose" / group
         files = sorted(path for path in here.iterdir() if path.suffix in (".png", ".jpg", ".jpeg", ".tif", ".tiff"))
@@ -337,7 +342,7 @@ def check_cellpose(folder, frames):
 
 
 def check_stardist(folder, frames):
-    """StarDist's rules: images/ and masks/ with the same names, whole labels, 0 is background."""
+    """Checks the rules of StarDist: images/ and masks/ with the same names, integer labels, 0 is background."""
     for group in FLAT:
         here = folder / "stardist" / group
         images, masks = (sorted(path.name for path in (here / part).glob("*.tif")) for part in ["images", "masks"])
@@ -349,7 +354,7 @@ def check_stardist(folder, frames):
 
 
 def filled(rings, shape):
-    """Pixels inside of rings along rows and columns, by the even-odd rule. A seam is run both ways and counts for nothing."""
+    """Fills rings along rows and columns by the even-odd rule. A seam is passed in both directions and cancels."""
     crossings = np.zeros((shape[0], shape[1] + 1), np.uint8)
     for ring in rings:
         for (x0, y0), (x1, y1) in zip(ring, [*ring[1:], ring[0]]):
@@ -359,22 +364,26 @@ def filled(rings, shape):
 
 
 def twice_area(ring):
-    """By the shoelace formula."""
+    """Returns twice the area, by the shoelace formula."""
     x, y = np.asarray(ring, np.int64).T
     return int((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
 
 
 def check_yolo(folder, frames, splits, categories):
-    """Ultralytics' rules: labels/SPLIT/NAME.txt beside images/SPLIT/NAME.png; class and fractions, three corners at least."""
+    """Checks the rules of Ultralytics: labels/SPLIT/NAME.txt and images/SPLIT/NAME.png; class and fractions, at least three corners."""
     here = folder / "yolo-seg"
     text = (here / "data.yaml").read_text()
     names = [json.loads(name) for name in re.findall(r"^  \d+: (.*)$", text, re.M)]
     equal("names in data.yaml", names, [category["name"] for category in categories])
     numbers = {category["id"]: number for number, category in enumerate(categories)}
-    # Ultralytics would look for a relative path where it runs, and without one takes the folder of the file.
-    check("path:" not in text, "data.yaml names a path")
-    for part in ["train", "val", "test"]:
-        check(f"{part}: images/{part}" in text.splitlines(), f"data.yaml has no {part}")
+    # Ultralytics resolves a relative path against the current folder; without a path it uses the folder of the file.
+    check("path:" not in text, "data.yaml has a path")
+    folders = dict(re.findall(r"^(train|val|test): (images/\w+)$", text, re.M))
+    parts = {row["by_slide"] for row in splits.values()}
+    equal("splits in data.yaml", set(folders), {"train", "val"} | parts)
+    for part, path in folders.items():
+        check((here / path).is_dir(), f"{path} of data.yaml does not exist")
+        check(part not in parts or path == f"images/{part}", f"the folder of {part} in data.yaml is {path}")
     found = sorted(path.relative_to(here / "labels").as_posix() for path in (here / "labels").rglob("*.txt"))
     equal("label files", found, sorted(f"{splits[f.index]['by_slide']}/{f.name}.txt" for f in frames))
     pictures = sorted(path.relative_to(here / "images").as_posix() for path in (here / "images").rglob("*.png"))
@@ -382,7 +391,7 @@ def check_yolo(folder, frames, splits, categories):
     lines = 0
     for frame in frames:
         place = f"{splits[frame.index]['by_slide']}/{frame.name}"
-        same(f"image {place}", imagecodecs.png_decode((here / f"images/{place}.png").read_bytes()), frame.picture())
+        same(f"image {place}", imagecodecs.png_decode((here / f"images/{place}.png").read_bytes()), frame.at_8_bits(frame.picture()))
         rows = [line.split() for line in (here / f"labels/{place}.txt").read_text().splitlines()]
         shown = [one for one in frame.objects if one.mask.any()]
         equal(f"lines of {place}", len(rows), len(shown))
@@ -390,25 +399,25 @@ def check_yolo(folder, frames, splits, categories):
             equal(f"class of {one.name}", int(row[0]), numbers[one.annotation["category_id"]])
             fractions = np.array(row[1:], float).reshape(-1, 2)
             check(len(fractions) >= 3 and len(row) > 6, f"{one.name} has {len(fractions)} corners")
-            check((fractions >= 0).all() and (fractions <= 1).all(), f"corners of {one.name} leave the image")
+            check((fractions >= 0).all() and (fractions <= 1).all(), f"corners of {one.name} are outside the image")
             corners = fractions * frame.shape[::-1]
             ring = np.rint(corners).astype(int).tolist()
-            check(np.abs(corners - ring).max() < 0.05, f"corners of {one.name} are no corners of pixels")
+            check(np.abs(corners - ring).max() < 0.05, f"corners of {one.name} are not pixel corners")
             equal(f"area of {one.name} by the shoelace formula", twice_area(ring), 2 * one.annotation["area"])
             same(f"polygon of {one.name}", filled([ring], frame.shape), one.mask)
             lines += 1
-    passed(f"yolo-seg: {lines} polygons fill to their masks exactly, {len(names)} classes")
+    passed(f"yolo-seg: {lines} polygons equal their masks, {len(names)} classes")
 
 
 def rings_of(geometry):
-    """Rings of a GeoJSON geometry without their last corner, which is the first."""
+    """Returns the rings of a GeoJSON geometry without the repeated last corner."""
     polygons = [geometry["coordinates"]] if geometry["type"] == "Polygon" else geometry["coordinates"]
     return [ring[:-1] for polygon in polygons for ring in polygon]
 
 
 def check_geometry(geometry, one, shape_px):
     form = shape(geometry)
-    check(form.is_valid, f"{one.name} is no valid polygon: {shapely.is_valid_reason(form)}")
+    check(form.is_valid, f"{one.name} is not a valid polygon: {shapely.is_valid_reason(form)}")
     equal(f"area of {one.name} by shapely", form.area, float(one.annotation["area"]))
     x, y, width, height = one.annotation["bbox"]
     equal(f"bounds of {one.name}", form.bounds, (x, y, x + width, y + height))
@@ -417,7 +426,7 @@ def check_geometry(geometry, one, shape_px):
 
 
 def check_qupath(folder, frames):
-    """GeoJSON as RFC 7946 and QuPath have it: shapely takes every polygon for valid, nuclei within cells."""
+    """Checks GeoJSON of RFC 7946 and QuPath: valid polygons for shapely, nuclei within cells."""
     ids, nuclei = Counter(), 0
     for frame in frames:
         path = folder / f"qupath/{frame.name}.ome.tif"
@@ -431,7 +440,7 @@ def check_qupath(folder, frames):
             ids[str(uuid.UUID(feature["id"]))] += 1
             number, properties = int(feature["properties"]["name"]), feature["properties"]
             cell = properties["objectType"] == "cell"
-            check(properties["objectType"] in ("cell", "detection"), f"{properties['objectType']} is no type of QuPath")
+            check(properties["objectType"] in ("cell", "detection"), f"{properties['objectType']} is not a type of QuPath")
             parts = ["cytoplasm"] if cell else ["nucleus", "debris"]
             one = next(by_id[number, part] for part in parts if (number, part) in left)
             left.remove((one.id, one.group))
@@ -442,19 +451,19 @@ def check_qupath(folder, frames):
             equal(f"class of {one.name}", properties["classification"]["name"], expected)
             if "nucleusGeometry" in feature:
                 nuclei += 1
-                check(cell, f"{one.name} is no cell and has a nucleus")
+                check(cell, f"{one.name} is not a cell but has a nucleus")
                 nucleus = by_id[number, "nucleus"]
                 left.discard((nucleus.id, "nucleus"))
                 inner = check_geometry(feature["nucleusGeometry"], nucleus, frame.shape)
                 outer = shapely.box(*form.bounds)
-                check(outer.covers(inner), f"{nucleus.name} leaves the bounds of its cell: {inner.bounds}, {form.bounds}")
-        equal(f"objects of frame {frame.index} that are in no feature", sorted(left), [])
-    equal("names that two features share", [name for name, count in ids.items() if count > 1], [])
-    passed(f"qupath: {len(ids)} features with valid polygons that are their masks, {nuclei} nuclei within their cells")
+                check(outer.covers(inner), f"{nucleus.name} is outside the bounds of its cell: {inner.bounds}, {form.bounds}")
+        equal(f"objects of frame {frame.index} without a feature", sorted(left), [])
+    equal("names of several features", [name for name, count in ids.items() if count > 1], [])
+    passed(f"qupath: {len(ids)} features with valid polygons equal to their masks, {nuclei} nuclei within their cells")
 
 
 def check_croissant(folder, manifest):
-    """What can be told without a reader of Croissant: files, hashes and columns are there."""
+    """Checks files, hashes and columns, without a reader of Croissant."""
     card = read_json(folder / "croissant.json")
     listed = {entry["path"]: entry for entry in manifest["files"]}
     for file in card["distribution"]:
@@ -469,33 +478,33 @@ def check_croissant(folder, manifest):
                 sets = {entry["@id"]: entry["includes"] for entry in card["distribution"] if "includes" in entry}
                 paths = [p.relative_to(folder).as_posix() for p in folder.glob(sets[source["fileSet"]["@id"]])]
                 check(paths, f"{source['fileSet']['@id']} has no files")
-            # external_full.py looks into Parquet.
+            # external_full.py checks Parquet.
             for path in [path for path in paths if not path.endswith(".parquet")]:
                 with open(folder / path, newline="") as file:
                     header = next(csv.reader(file))
                 check(source["extract"]["column"] in header, f"{path} has no column {source['extract']['column']}")
             columns += 1
-    passed(f"croissant.json: hashes of {len(card['distribution'])} entries, {columns} columns that there are")
+    passed(f"croissant.json: hashes of {len(card['distribution'])} entries, {columns} columns exist")
 
 
 def check_pages(folder, pages):
-    """The Python of the pages on formats runs."""
+    """Runs the Python code of the pages on formats."""
     for page in sorted(pages.glob("*.md")):
         for block in re.findall(r"^```python\n(.*?)^```", page.read_text(), re.M | re.S):
             with contextlib.redirect_stdout(None):
                 exec(compile(block, str(page), "exec"), {"DIR": str(folder)})
-            passed(f"the Python of {page.name} runs")
+            passed(f"the Python code of {page.name} runs")
 
 
 def check_tiffs(folder):
-    """What ImageJ reads by itself: nothing, or zlib without differences, which it would show as they are."""
+    """Checks that TIFF files are uncompressed or zlib without predictor, as ImageJ reads them without plugins."""
     paths = sorted(folder.rglob("*.tif"))
     for path in paths:
         with tifffile.TiffFile(path) as file:
             for page in file.pages:
                 plain = page.predictor == 1 and page.compression.name in ("NONE", "ADOBE_DEFLATE")
-                check(plain, f"{path} is compressed in a way that ImageJ does not know")
-    passed(f"{len(paths)} TIFF files are of the kinds that ImageJ reads")
+                check(plain, f"{path} has a compression that ImageJ does not read")
+    passed(f"{len(paths)} TIFF files can be read by ImageJ")
 
 
 def main(folder, pages=None):

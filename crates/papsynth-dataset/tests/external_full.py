@@ -1,10 +1,10 @@
-"""Checks a data set that holds all formats at once with heavier readers than external_formats.py.
+"""Checks a data set in all formats with further readers, which take longer to install than those of external_formats.py.
 
 Usage: python external_full.py DIR PAGES [JAR]
 
-DIR was written by a program built with the feature `parquet`, huggingface among its formats. Needs mlcroissant, datasets, pyarrow, opencv-python-headless and what external_formats.py needs. JAR is the package of Bio-Formats, by
-which Fiji and QuPath read; it runs where there is a Java. Prints a line for each check and ends with status 1 at the first
-that fails.
+DIR was written by a program built with the feature `parquet`, with the format huggingface. Needs mlcroissant, datasets, pyarrow,
+opencv-python-headless and the packages of external_formats.py. JAR is the package of Bio-Formats, the reader of Fiji and QuPath; it
+needs Java. Prints a line for each check and exits with status 1 at the first failure.
 """
 
 import contextlib
@@ -33,12 +33,12 @@ from external_formats import check_truth, same
 
 
 def check_croissant(folder, frames):
-    """mlcroissant finds no error, and compares the SHA-256 of what it reads."""
+    """Checks with mlcroissant, which compares SHA-256."""
     logging.getLogger("absl").setLevel(logging.ERROR)
     dataset = mlcroissant.Dataset(jsonld=folder / "croissant.json")
     issues = dataset.metadata.ctx.issues
     equal("errors of croissant.json", issues.errors, set())
-    # A date would make two data sets of the same seed differ.
+    # There is no date, so that data sets of the same seed are equal.
     unexpected = [warning for warning in issues.warnings if "datePublished" not in warning]
     equal("warnings of croissant.json", unexpected, [])
     rows = list(dataset.records(record_set="splits"))
@@ -49,14 +49,14 @@ def check_croissant(folder, frames):
     sizes = [(row["frames/index"], row["frames/height"], row["frames/width"]) for row in rows]
     equal("rows of frames", sizes, [(frame.index, *frame.shape) for frame in frames])
     sets = {entry["@id"] for entry in json.loads((folder / "croissant.json").read_text())["distribution"] if entry["@type"] == "cr:FileSet"}
-    check({"webdataset", "huggingface"} <= sets, f"croissant.json names the sets {sets}")
+    check({"webdataset", "huggingface"} <= sets, f"croissant.json has the sets {sets}")
     with tempfile.TemporaryDirectory() as copy:
         for name in ["croissant.json", "splits.csv"]:
             (Path(copy) / name).write_bytes((folder / name).read_bytes())
         (Path(copy) / "splits.csv").write_text("image,slide,by_field,by_slide\n")
         try:
             list(mlcroissant.Dataset(jsonld=Path(copy) / "croissant.json").records(record_set="splits"))
-            check(False, "mlcroissant takes a file of another SHA-256")
+            check(False, "mlcroissant accepts a file with another SHA-256")
         except Exception as error:
             reason = f"{error} {error.__cause__}"
             check("hash" in reason.lower(), f"mlcroissant says {reason}")
@@ -64,7 +64,7 @@ def check_croissant(folder, frames):
 
 
 def check_datasets(folder, frames):
-    """Hugging Face reads the tar files, whose images it decodes with Pillow."""
+    """Reads the tar files with `datasets`, which decodes images with Pillow."""
     with tempfile.TemporaryDirectory() as cache:
         files = sorted(str(path) for path in folder.glob("webdataset/*.tar"))
         data = datasets.load_dataset("webdataset", data_files={"train": files}, split="train", cache_dir=cache)
@@ -72,15 +72,14 @@ def check_datasets(folder, frames):
         for row, frame in zip(data, frames):
             equal(f"summary of {frame.name} by datasets", row["json"]["frame"]["index"], frame.index)
             picture = row["png"] if frame.planes == 1 else row["all-in-focus.png"]
-            if frame.summary["bits"] <= 8:
-                same(f"image {frame.name} by datasets", np.array(picture), frame.picture())
+            same(f"image {frame.name} by datasets", np.array(picture), frame.at_8_bits(frame.picture()))
             labels = np.array(row["nucleus.png"]).astype(np.int64)
             same(f"nucleus.png {frame.name} by datasets", labels, frame.labels("nucleus", frame.policy))
     passed(f"webdataset: datasets reads {len(frames)} rows")
 
 
 def check_tables(folder, frames, records):
-    """The tables of objects as Parquet by pyarrow: what the CSV says, and masks that pycocotools takes."""
+    """Compares the Parquet tables with the CSV (pyarrow), and their masks with COCO (pycocotools)."""
     count = 0
     names = [f"objects/{record['shard']:06}" for record in records]
     for name in names + ["objects"] * (folder / "objects.parquet").exists():
@@ -107,18 +106,18 @@ def check_tables(folder, frames, records):
                 equal(f"{key} of {one.name} in {name}.parquet", found[key], counts)
                 equal(f"area of {key} of {one.name}", int(rle.area({"size": size, "counts": found[key]})), found[area])
             count += 1
-    passed(f"objects/*.parquet: pyarrow reads {count} rows as the CSV has them, run lengths byte by byte as COCO")
+    passed(f"objects/*.parquet: pyarrow reads {count} rows equal to the CSV, run lengths equal to COCO")
 
 
 def check_huggingface(folder, frames, categories, splits):
-    """`datasets` reads the folder without a script: images, planes and objects by split."""
+    """Reads the folder with `datasets`: images, planes and objects by split."""
     names = {"train": "train", "val": "validation", "test": "test"}
     by_index = {frame.index: frame for frame in frames}
     expected = {}
     for frame in frames:
         expected.setdefault(names[splits[frame.index]], []).append(frame.index)
     with tempfile.TemporaryDirectory() as cache:
-        # By the card, and by the files alone.
+        # With the card, and from the files alone.
         files = {}
         for path in sorted(folder.glob("huggingface/data/*.parquet")):
             files.setdefault(path.name.split("-")[0], []).append(str(path))
@@ -135,22 +134,20 @@ def check_huggingface(folder, frames, categories, splits):
                 raw = part.cast_column("image", datasets.Image(decode=False))
                 for row, bare in zip(part, raw):
                     check_row(row, bare, by_index[row["index"]], categories)
-    passed(f"huggingface: datasets reads {len(frames)} frames in {len(expected)} splits, pixels, areas and run lengths as elsewhere")
+    passed(f"huggingface: datasets reads {len(frames)} frames in {len(expected)} splits, pixels, areas and run lengths as in other formats")
 
 
 def check_row(row, bare, frame, categories):
     what = f"row of frame {frame.index}"
     check(isinstance(row["image"], Image.Image), f"the image of {what} is {type(row['image'])}")
-    same(f"image of {what}", imagecodecs.png_decode(bare["image"]["bytes"]), frame.picture())
-    # Pillow reads 16-bit colour as 8 bits.
-    if frame.summary["bits"] <= 8 or not frame.colour:
-        same(f"image of {what} by Pillow", np.array(row["image"]), frame.picture())
+    same(f"image of {what}", imagecodecs.png_decode(bare["image"]["bytes"]), frame.at_8_bits(frame.picture()))
+    same(f"image of {what} by Pillow", np.array(row["image"]), frame.at_8_bits(frame.picture()))
     planes = frame.stack() if frame.planes > 1 else []
     equal(f"planes of {what}", len(row["planes"]), len(planes))
     for plane, expected in zip(row["planes"], planes):
-        if frame.summary["bits"] <= 8:
-            same(f"plane of {what}", np.array(plane), expected)
-    for key in ["slide", "width", "height", "pixel_um", "bits", "planes_um"]:
+        same(f"plane of {what}", np.array(plane), frame.at_8_bits(expected))
+    equal(f"bits of {what}", [row["bits"], row["camera_bits"]], [frame.summary["training_bits"], frame.summary["bits"]])
+    for key in ["slide", "width", "height", "pixel_um", "planes_um"]:
         equal(f"{key} of {what}", row[key], frame.summary[key])
     equal(f"objects of {what}", len(row["objects"]), len(frame.objects))
     for found, one in zip(row["objects"], frame.objects):
@@ -168,7 +165,7 @@ def check_row(row, bare, frame, categories):
 
 
 def check_opencv(folder, frames):
-    """Polygons of yolo-seg as Ultralytics fills them: no pixel of the mask is left out, none beyond its neighbours drawn."""
+    """Fills polygons of yolo-seg with OpenCV, as Ultralytics does. They differ from masks only under the outline."""
     lines = 0
     for frame in frames:
         (path,) = folder.glob(f"yolo-seg/labels/*/{frame.name}.txt")
@@ -179,15 +176,15 @@ def check_opencv(folder, frames):
             cv2.fillPoly(drawn, [np.rint(corners).astype(np.int32)], 1)
             seams = np.zeros(frame.shape, np.uint8)
             cv2.polylines(seams, [np.rint(corners).astype(np.int32)], True, 1)
-            # Where the polygon runs, the pixel belongs to it for OpenCV.
+            # OpenCV also fills the pixels under the outline.
             off = (drawn.astype(bool) != one.mask) & (seams == 0)
-            equal(f"pixels of {one.name} that OpenCV fills otherwise", int(off.sum()), 0)
+            equal(f"pixels of {one.name} that differ in OpenCV", int(off.sum()), 0)
             lines += 1
-    passed(f"yolo-seg: OpenCV fills {lines} polygons to their masks, but for the pixels under the outline")
+    passed(f"yolo-seg: OpenCV fills {lines} polygons to their masks, except for the pixels under the outline")
 
 
 def check_bio_formats(folder, frames, jar):
-    """Bio-Formats reads every OME-TIFF without complaint; what it writes again is the same."""
+    """Converts every OME-TIFF with Bio-Formats and compares the result."""
     paths = sorted([*folder.glob("ome-tiff/*.ome.tif"), *folder.glob("qupath/*.ome.tif"), *folder.glob("images/*.ome.tif")])
     with tempfile.TemporaryDirectory() as out:
         for number, path in enumerate(paths):
@@ -197,24 +194,24 @@ def check_bio_formats(folder, frames, jar):
             equal(f"status of Bio-Formats for {path}: {done.stderr[-400:]}", done.returncode, 0)
             expected, found = tifffile.imread(path), tifffile.imread(again)
             if found.shape != expected.shape:
-                # It writes channels as planes.
+                # Bio-Formats writes channels as planes.
                 found = np.moveaxis(found, -3, -1) if expected.shape[-1] == 3 else found
             same(f"{path} by Bio-Formats", found.reshape(expected.shape), expected)
-            with tifffile.TiffFile(path) as ours, tifffile.TiffFile(again) as theirs:
+            with tifffile.TiffFile(path) as source, tifffile.TiffFile(again) as copy:
                 for key in ["SizeX", "SizeY", "SizeZ", "SizeC", "SizeT", "PhysicalSizeX", "PhysicalSizeY", "PhysicalSizeZ"]:
-                    values = [re.search(rf' {key}="([^"]*)"', file.ome_metadata) for file in (ours, theirs)]
+                    values = [re.search(rf' {key}="([^"]*)"', file.ome_metadata) for file in (source, copy)]
                     values = [value and float(value[1]) for value in values]
                     equal(f"{key} of {path} by Bio-Formats", values[1], values[0])
-    passed(f"Bio-Formats reads and writes again {len(paths)} OME-TIFFs, pixels and sizes the same")
+    passed(f"Bio-Formats converts {len(paths)} OME-TIFFs with equal pixels and sizes")
 
 
 def check_pages(folder, pages):
-    """The Python of the pages on formats that wants heavier readers runs."""
+    """Runs the Python code of the pages on formats that needs these readers."""
     for page in sorted(pages.glob("*.md")):
         for block in re.findall(r"^```python full\n(.*?)^```", page.read_text(), re.M | re.S):
             with contextlib.redirect_stdout(io.StringIO()):
                 exec(compile(block, str(page), "exec"), {"DIR": str(folder)})
-            passed(f"the Python of {page.name} runs")
+            passed(f"the Python code of {page.name} runs")
 
 
 def main(folder, pages, jar=None):

@@ -1,8 +1,8 @@
-"""Has a whole slide read by zarr-python, tensorstore, ome-zarr-models, pyarrow, pycocotools and shapely: every pixel of every level, every mask.
+"""Reads a slide with zarr-python, tensorstore, ome-zarr-models, pyarrow, pycocotools and shapely: every pixel of every level, every mask.
 
 Usage: python external_slide.py DIR PAGE
 
-DIR is a slide, PAGE the page whose Python is run on it. Prints a line for each check and ends with status 1 at the first that fails.
+DIR is a slide, PAGE the page whose Python code is run on it. Prints a line for each check and exits with status 1 at the first failure.
 """
 
 import csv
@@ -25,14 +25,14 @@ csv.field_size_limit(1 << 28)
 
 
 def half(values):
-    """The mean of two by two, a half upwards; an odd border counts twice."""
+    """Returns the rounded means of 2 x 2 values; an odd border is repeated."""
     rows, columns = values.shape
     values = np.pad(values.astype(np.int64), [(0, rows % 2), (0, columns % 2)], mode="edge")
     return sum(values[y::2, x::2] for y in (0, 1) for x in (0, 1)) + 2 >> 2
 
 
 def read_table(folder):
-    """Every value of the Parquet tables is that of the CSV beside it."""
+    """Compares the Parquet tables with the CSV."""
     count = 0
     for path in sorted(folder.glob("*.parquet")):
         typed = pyarrow.dataset.dataset(path, format="parquet").to_table().to_pylist()
@@ -78,34 +78,34 @@ def main(folder, page):
     rows = read_table(folder / "objects")
     passed(f"pyarrow: {rows} rows with the values of the CSV")
     layers = np.zeros(labels["layers"].shape, dtype=np.int64)
-    told, outlines = {}, {}
+    known, outlines = {}, {}
     for table in sorted((folder / "objects").glob("*.csv")):
         for row in csv.DictReader(table.open()):
             key = row["part"], int(row["id"])
-            check(key not in told, "every object is told once")
+            check(key not in known, "every object has one row")
             x, y, w, h = (int(row[f"bbox_{side}_px"]) for side in ("x", "y", "width", "height"))
             mask = coco.decode({"size": [h, w], "counts": row["rle"]}).astype(bool)
             check(mask.sum() == int(row["area_px"]), "a mask has its area")
             check(mask[0].any() and mask[-1].any() and mask[:, 0].any() and mask[:, -1].any(), "a box is tight")
-            told[key] = mask.sum()
+            known[key] = mask.sum()
             group_of = "debris" if row["part"] == "whole" else row["part"]
             check(np.all(labels[group_of][y : y + h, x : x + w][mask] > 0), "labels cover every mask")
             if row["part"] == "cytoplasm":
                 layers[y : y + h, x : x + w] += mask
         for feature in json.loads(table.with_suffix(".geojson").read_text())["features"]:
             outline = shape(feature["geometry"])
-            check(outline.is_valid, "outlines are sound")
+            check(outline.is_valid, "outlines are valid")
             cell = feature["properties"]["objectType"] == "cell"
             name = int(feature["properties"]["name"])
             outlines["cytoplasm" if cell else "other", name] = outline.area
             if cell and "nucleusGeometry" in feature:
                 outlines["nucleus", name] = shape(feature["nucleusGeometry"]).area
-    for (part, number), area in told.items():
+    for (part, number), area in known.items():
         found = outlines.get((part, number), outlines.get(("other", number)))
         check(found == area, f"the outline of {part} {number} has the area of its mask")
-    check(np.all(labels["layers"] >= layers), "layers count every cytoplasm that is told")
+    check(np.all(labels["layers"] >= layers), "layers count every cytoplasm")
     check(np.any(layers > 1), "some overlap")
-    passed(f"pycocotools, shapely: {len(told)} masks and outlines on {len(labels)} label images")
+    passed(f"pycocotools, shapely: {len(known)} masks and outlines on {len(labels)} label images")
 
     for block in re.findall(r"```python\n(.*?)```", page.read_text(), re.S):
         exec(compile(block, page.name, "exec"), {"DIR": str(folder)})

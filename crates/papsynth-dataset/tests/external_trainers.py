@@ -1,9 +1,9 @@
-"""Has the formats of Cellpose and StarDist read by the code that reads their training data.
+"""Reads the formats cellpose and stardist with the loaders of these programs.
 
 Usage: python external_trainers.py DIR...
 
-Each DIR is a data set in the formats cellpose and stardist. What Cellpose trains with is not installed and not needed to read: it is stood for by
-nothing. Prints a line for each check and ends with status 1 at the first that fails.
+Each DIR is a data set in the formats cellpose and stardist. Libraries for training are replaced by mocks, because loaders do not need
+them. Prints a line for each check and exits with status 1 at the first failure.
 """
 
 import sys
@@ -20,8 +20,8 @@ from external import check, passed
 warnings.filterwarnings("ignore")
 
 
-class Absent:
-    """Stands for libraries that train, which reading files does not call."""
+class MockImporter:
+    """Replaces libraries for training by mocks."""
 
     NAMES = ("torch", "torchvision", "segment_anything")
 
@@ -37,7 +37,7 @@ class Absent:
         pass
 
 
-sys.meta_path.append(Absent())
+sys.meta_path.append(MockImporter())
 
 from cellpose.io import load_train_test_data  # noqa: E402
 from csbdeep.data import RawData  # noqa: E402
@@ -45,7 +45,7 @@ from stardist.geometry import star_dist  # noqa: E402
 
 
 def same(read, path, what):
-    check(np.array_equal(np.squeeze(read), np.squeeze(tifffile.imread(path))), f"{what}: {path} is read as it is")
+    check(np.array_equal(np.squeeze(read), np.squeeze(tifffile.imread(path))), f"{what}: {path} is read without changes")
 
 
 def read_cellpose(folder):
@@ -59,7 +59,7 @@ def read_cellpose(folder):
 
 
 def is_grey(folder):
-    """CSBDeep wants images and masks of the same axes."""
+    """Whether images are grey. CSBDeep needs images and masks with the same axes."""
     return tifffile.imread(next(folder.glob("*/images/*.tif"))).ndim == 2
 
 
@@ -70,8 +70,8 @@ def read_stardist(folder):
     found = sorted(data.generator(), key=lambda pair: pair[1].tobytes())
     masks = sorted((tifffile.imread(path) for path in files), key=lambda mask: mask.tobytes())
     for (_, mask, _, _), expected in zip(found, masks):
-        check(np.array_equal(mask, expected), f"CSBDeep reads the masks of {folder} as they are")
-        # What StarDist learns: from each pixel of an object the distances to its border.
+        check(np.array_equal(mask, expected), f"CSBDeep reads the masks of {folder} without changes")
+        # StarDist learns the distances from each pixel of an object to its border.
         check(np.array_equal(star_dist(mask.astype(np.uint16), 8).max(axis=-1) > 0, mask > 0), "StarDist sees every object")
     return len(files)
 

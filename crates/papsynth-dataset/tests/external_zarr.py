@@ -1,10 +1,10 @@
-"""Has the OME-Zarr groups of a data set that holds the formats folder and ome-zarr, among others, read by zarr-python, tensorstore,
-ome-zarr-models, ome-zarr and napari's reader: every pixel of every level, every mask of every object.
+"""Reads the OME-Zarr groups of a data set with the formats folder and ome-zarr with zarr-python, tensorstore, ome-zarr-models, ome-zarr
+and the reader of napari: every pixel of every level, every mask of every object.
 
 Usage: python external_zarr.py DIR PAGES
 
-Needs zarr, tensorstore, ome-zarr-models, ome-zarr, napari-ome-zarr and what external_formats.py needs. Prints a line for each check and ends
-with status 1 at the first that fails.
+Needs zarr, tensorstore, ome-zarr-models, ome-zarr, napari-ome-zarr and the packages of external_formats.py. Prints a line for each check and
+exits with status 1 at the first failure.
 """
 
 import contextlib
@@ -28,7 +28,7 @@ from external_formats import check_truth, same
 
 
 def half(values):
-    """The mean of two by two, a half upwards; an odd border counts twice."""
+    """Returns the rounded means of 2 x 2 values; an odd border is repeated."""
     rows, columns = values.shape[-2:]
     border = [(0, 0)] * (values.ndim - 2) + [(0, rows % 2), (0, columns % 2)]
     values = np.pad(values.astype(np.int64), border, mode="edge")
@@ -40,7 +40,7 @@ def path_of(frame):
 
 
 def expected(frame):
-    """The image as the format folder has it, axes c, z, y, x as needed."""
+    """Returns the image of the format folder, with the axes c, z, y, x as needed."""
     stack = frame.stack()
     if frame.colour:
         stack = np.moveaxis(stack, -1, 0)
@@ -52,7 +52,7 @@ def levels_of(group):
 
 
 def check_zarr(frames):
-    """zarr-python and tensorstore: every level of image and labels."""
+    """Reads every level of images and labels with zarr-python and tensorstore."""
     arrays, layers, objects = 0, 0, 0
     for frame in frames:
         path = path_of(frame)
@@ -77,7 +77,7 @@ def check_zarr(frames):
             for number, level in enumerate(levels_of(labels)):
                 same(f"level {level} of labels {name} of {path}", labels[level][:], full[:: 2**number, :: 2**number])
             known = labels.attrs["ome"]["image-label"].get("properties", [])
-            equal(f"labels {name} of {path} that are described", {row["label-value"] for row in known}, set(np.unique(full).tolist()) - {0})
+            equal(f"labels {name} of {path} with properties", {row["label-value"] for row in known}, set(np.unique(full).tolist()) - {0})
             shown[name.rsplit("-", 1)[0]].append((full, {row["label-value"]: row for row in known}))
             layers += 1
         for one in frame.objects:
@@ -93,11 +93,11 @@ def check_zarr(frames):
                 parent = annotation["parent_id"] and frame.coco.anns[annotation["parent_id"]]["object_id"]
                 equal(f"parent of {one.name} in {path}", row["parent"], parent)
                 objects += 1
-    passed(f"ome-zarr: zarr-python and tensorstore read {arrays} levels pixel by pixel, {layers} label layers hold {objects} masks whole")
+    passed(f"ome-zarr: zarr-python and tensorstore read {arrays} levels pixel by pixel, {layers} label layers have {objects} complete masks")
 
 
 def check_models(frames):
-    """ome-zarr-models: the documents follow the specification."""
+    """Validates the documents with ome-zarr-models."""
     for frame in frames:
         group = zarr.open_group(path_of(frame), mode="r")
         image = Image.from_zarr(group)
@@ -120,12 +120,12 @@ def check_models(frames):
 
 
 def check_readers(frames):
-    """ome-zarr and napari's reader: the image and every label layer, in µm."""
+    """Reads images and label layers with ome-zarr and the reader of napari, in µm."""
     layers = 0
     for frame in frames:
         path, image = path_of(frame), expected(frame)
         names = zarr.open_group(path, mode="r")["labels"].attrs["ome"]["labels"]
-        # ome-zarr prints what it reads.
+        # ome-zarr prints progress.
         with warnings.catch_warnings(), contextlib.redirect_stdout(None):
             warnings.simplefilter("ignore")
             nodes = list(Reader(parse_url(path, mode="r"))())
@@ -144,15 +144,15 @@ def check_readers(frames):
         for (data, about, _), name in zip(labels, names):
             same(f"labels {name} of {path} for napari", np.asarray(data[0]), group["labels"][name]["0"][:])
             layers += 1
-    passed(f"ome-zarr: ome-zarr reads {len(frames)} images, napari's reader the same and {layers} label layers")
+    passed(f"ome-zarr: ome-zarr reads {len(frames)} images, the reader of napari also {layers} label layers")
 
 
 def check_pages(folder, pages):
-    """The Python of the page on this format runs."""
+    """Runs the Python code of the page on this format."""
     for block in re.findall(r"^```python zarr\n(.*?)^```", (pages / "ome-zarr.md").read_text(), re.M | re.S):
         with contextlib.redirect_stdout(io.StringIO()):
             exec(compile(block, "ome-zarr.md", "exec"), {"DIR": str(folder)})
-        passed("the Python of ome-zarr.md runs")
+        passed("the Python code of ome-zarr.md runs")
 
 
 def main(folder, pages):

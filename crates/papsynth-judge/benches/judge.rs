@@ -1,4 +1,4 @@
-//! How many fields are measured a second, and how long a judgement takes.
+//! Time to measure a field, and to compare two sets of fields.
 
 use std::hint::black_box;
 
@@ -15,24 +15,24 @@ fn measurer(detail: Detail) -> Measurer {
         .expect("defaults are in range")
 }
 
-/// A field of 1280 x 960 pixels with 29 nuclei, on one thread.
+/// Measures a field of 1280 x 960 pixels with 29 nuclei on one thread.
 fn measure(c: &mut Criterion) {
-    let picture = Toy { width: 1280, height: 960, cells: 29, ..Toy::default() }.picture(1);
+    let image = Toy { width: 1280, height: 960, cells: 29, ..Toy::default() }.image(1);
     let mut group = c.benchmark_group("measure 1280x960");
     group.sample_size(10).throughput(Throughput::Elements(1));
     for (name, detail) in [("statistics", Detail::Statistics), ("everything", Detail::Everything)] {
         let measurer = measurer(detail);
-        group.bench_function(name, |b| b.iter(|| measurer.measure(black_box(&picture))));
+        group.bench_function(name, |b| b.iter(|| measurer.measure(black_box(&image))));
     }
     group.finish();
 }
 
-/// Twelve fields against twelve, measured before, on all threads.
+/// Compares 12 with 12 measured fields on all threads.
 fn compare(c: &mut Criterion) {
     let toy = Toy { width: 640, height: 480, cells: 12, ..Toy::default() };
     let measurer = measurer(Detail::Everything);
     let fields = |seed: u64| -> Vec<Field> {
-        toy.pictures(12, seed).iter().map(|p| measurer.measure(p).expect("toy fields are pictures")).collect()
+        toy.images(12, seed).iter().map(|p| measurer.measure(p).expect("toy fields are images")).collect()
     };
     let (real, synthetic) = (fields(1), fields(100));
     let mut group = c.benchmark_group("compare 12 with 12");

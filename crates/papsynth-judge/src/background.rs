@@ -1,35 +1,37 @@
-//! The light of the empty slide, and what objects take from it.
+//! Background light of the empty slide, and absorbance.
 
 use crate::number::{nearest, single};
 use crate::statistics::{median, quantile};
 
-/// Side of the blocks whose medians the surface is fitted to, pixels.
+/// Size of the blocks whose medians the surface is fitted to, pixels.
 const BLOCK: usize = 8;
 
-/// Blocks that may be empty slide to begin with: within this part of the brightest.
+/// Initial candidates for empty slide are within this fraction of the brightest block.
 const FIRST_BAND: f64 = 0.08;
 
-/// Narrowest band that blocks of empty slide are sought in: two grey levels of 255.
+/// Narrowest band of levels of empty slide: two grey levels of 255.
 const NARROWEST_BAND: f64 = 0.008;
 
-/// Rounds of fitting and choosing; later ones change nothing that is seen.
+/// Rounds of selection and fitting. More rounds do not change the result noticeably.
 const ROUNDS: usize = 6;
 
-/// How strongly the surface is held flat, a part of the blocks' number: felt where only a corner of the slide is empty.
+/// Regularisation towards a flat surface, as a fraction of the number of blocks. It matters if only a corner of the
+/// field is empty.
 const STIFFNESS: f64 = 1e-4;
 
-/// Least light that counts, as a part of full scale: half a level of 8 bits.
+/// Minimum light, as a fraction of full scale: half a grey level of 8 bits.
 const LEAST_LIGHT: f32 = 0.5 / 255.0;
 
-/// Terms 1, x, y, x², xy, y² over −1..1.
+/// Number of terms: 1, x, y, x², xy, y² over −1..1.
 const TERMS: usize = 6;
 
-/// A quadratic surface: the factors of 1, x, y, x², xy and y².
+/// A quadratic surface: coefficients of 1, x, y, x², xy and y².
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Surface(pub(crate) [f64; TERMS]);
 
 impl Surface {
-    /// By least squares through values at points of −1..1, of which all but the mean is held back by `stiffness` points.
+    /// Fits a surface to values at points of −1..1 by least squares. `stiffness` is a ridge penalty on all terms except
+    /// the constant.
     pub(crate) fn fit(points: &[([f64; 2], f64)], stiffness: f64) -> Self {
         let mut normal = [[0.0; TERMS + 1]; TERMS];
         for ([x, y], level) in points {
@@ -52,20 +54,20 @@ impl Surface {
     }
 }
 
-/// A quadratic surface through the empty parts of a picture.
+/// A quadratic surface through the empty slide of an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Background {
-    /// Over −1..1, parts of full scale.
+    /// Surface over −1..1, fractions of full scale.
     pub(crate) surface: Surface,
     width: usize,
     height: usize,
 }
 
 impl Background {
-    /// The surface of grey levels `0..=full_scale`.
+    /// Fits the surface to grey levels `0..=full_scale`.
     ///
-    /// Empty slide is bright and even: blocks are taken within a band around the brightest (their 98th percentile) whose own
-    /// spread is that of the most even ones, and the band is narrowed around the surface through them.
+    /// Empty slide is bright and even: the fit uses blocks of low variation in a band around the 98th percentile of the
+    /// block medians. Each round narrows the band around the fitted surface.
     pub(crate) fn new(grey: &[f32], width: usize, full_scale: f32) -> Self {
         let height = grey.len() / width;
         let blocks = blocks(grey, width, full_scale);
@@ -95,14 +97,14 @@ impl Background {
         Self { surface, width, height }
     }
 
-    /// Difference of the surface's highest and lowest place, over its mean.
+    /// Returns maximum minus minimum of the surface, over its mean.
     pub(crate) fn peak_to_valley(&self) -> f64 {
         let values = self.grid();
         let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
         (high - low) / self.mean().max(f64::from(LEAST_LIGHT))
     }
 
-    /// Its mean, a part of full scale.
+    /// Returns the mean, as a fraction of full scale.
     pub(crate) fn mean(&self) -> f64 {
         let values = self.grid();
         values.iter().sum::<f64>() / values.len() as f64
@@ -113,7 +115,7 @@ impl Background {
         (-10..=10).flat_map(|y| (-10..=10).map(move |x| [at(x), at(y)])).map(|p| self.surface.at(p)).collect()
     }
 
-    /// Absorbance A = −log₁₀(I/B) of every pixel.
+    /// Returns the absorbance A = −log₁₀(I/B) of each pixel.
     pub(crate) fn absorbance(&self, grey: &[f32], full_scale: f32) -> Vec<f32> {
         let mut out = Vec::with_capacity(grey.len());
         let [c, cx, cy, cxx, cxy, cyy] = self.surface.0;
@@ -132,11 +134,11 @@ impl Background {
 }
 
 struct Block {
-    /// Of its middle, over −1..1.
+    /// Centre, over −1..1.
     place: [f64; 2],
-    /// Median, a part of full scale.
+    /// Median, as a fraction of full scale.
     level: f64,
-    /// Distance between the 10th and the 90th percentile.
+    /// 90th minus 10th percentile.
     spread: f64,
 }
 
@@ -160,7 +162,7 @@ fn blocks(grey: &[f32], width: usize, full_scale: f32) -> Vec<Block> {
     blocks
 }
 
-/// Gauss–Jordan elimination of a symmetric, positive definite system.
+/// Solves a symmetric, positive definite system by Gauss–Jordan elimination.
 fn solve(mut rows: [[f64; TERMS + 1]; TERMS]) -> [f64; TERMS] {
     for i in 0..TERMS {
         let pivot = rows[i][i].max(1e-12);
@@ -180,13 +182,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_surface_and_the_absorbance_of_what_lies_on_it_are_found() {
+    fn surface_and_absorbance_are_recovered() {
         let (width, height) = (400, 300);
         let terms = [0.9, 0.004, -0.006, -0.03, 0.002, -0.012];
         let lamp = Surface(terms);
         let at =
             |i: usize| [2.0 * (i % width) as f64 / width as f64 - 1.0, 2.0 * (i / width) as f64 / height as f64 - 1.0];
-        // Half of the field is covered, in two layers.
+        // Half of the field is covered: one layer, and two.
         let a = |i: usize| {
             if i % width < 120 {
                 0.05
@@ -222,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_without_empty_slide_still_has_a_background() {
+    fn an_image_without_empty_slide_has_a_background() {
         let grey: Vec<f32> = (0..64 * 64).map(|i| f32::from(u8::try_from((i * 37) % 256).unwrap_or(0))).collect();
         let found = Background::new(&grey, 64, 255.0);
         assert!(found.surface.0.iter().all(|t| t.is_finite()) && found.mean() > 0.3);

@@ -6,8 +6,8 @@ use crate::error::Error;
 
 /// Progress of a long function: `done` of `total` steps of a phase are complete.
 ///
-/// The steps of a phase take about the same time, so the phase needs another `elapsed * (total - done) / done`. Threads may
-/// report steps out of order.
+/// The steps of a phase take about the same time, so the phase needs another `elapsed * (total - done) / done`. Threads
+/// may report steps out of order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress<'a> {
     /// Name of the phase, to print before the numbers: "measuring fields", "classifying nuclei", ….

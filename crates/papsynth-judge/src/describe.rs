@@ -1,8 +1,8 @@
 //! Features and statistics in words.
 
 /// Returns a description of a feature of [`FeatureTable`](crate::FeatureTable), of a statistic of
-/// [`Statistics::scalars`](crate::Statistics::scalars) or of a descriptor of [`Moments`](crate::Moments); other names are returned
-/// as they are.
+/// [`Statistics::scalars`](crate::Statistics::scalars) or of a descriptor of [`Moments`](crate::Moments); other names
+/// are returned as they are.
 ///
 /// ```
 /// use papsynth_judge::describe;

@@ -1,18 +1,18 @@
-//! Filters of whole images.
+//! Image filters.
 
 use multiversion::multiversion;
 
 use crate::number::{single, whole};
 
-/// Taps reach so many standard deviations far.
+/// Radius of the kernel, standard deviations.
 const REACH: f64 = 3.5;
 
-/// Convolution with a Gaussian; the image is mirrored at its border.
+/// Convolves an image with a Gaussian. The border is a mirror.
 pub(crate) fn blur(image: &[f32], width: usize, sigma: f64) -> Vec<f32> {
     separable(image, width, &taps(sigma), mirrored)
 }
 
-/// The taps of a Gaussian from its centre outwards.
+/// Returns the taps of a Gaussian, from the centre outwards.
 fn taps(sigma: f64) -> Vec<f32> {
     let radius = whole((REACH * sigma).ceil()).max(1);
     let weights: Vec<f64> = (0..=radius).map(|i| libm::exp(-0.5 * (i * i) as f64 / (sigma * sigma))).collect();
@@ -20,8 +20,9 @@ fn taps(sigma: f64) -> Vec<f32> {
     weights.iter().map(|w| single(w / sum)).collect()
 }
 
-/// Convolution with symmetric taps along rows and along columns, given from their centre outwards. `place` says which index in
-/// `0..length` stands for `i - reach`, from `i`, `reach` and `length`.
+/// Convolves rows and columns with symmetric taps, given from the centre outwards. `place(i, reach, length)` returns
+/// the index in
+/// `0..length` that replaces `i - reach`.
 pub fn separable(image: &[f32], width: usize, taps: &[f32], place: fn(usize, usize, usize) -> usize) -> Vec<f32> {
     let height = image.len() / width.max(1);
     let mut rows = vec![0.0; image.len()];
@@ -31,25 +32,25 @@ pub fn separable(image: &[f32], width: usize, taps: &[f32], place: fn(usize, usi
         for (i, value) in padded.iter_mut().enumerate() {
             *value = from[place(i, reach, width)];
         }
-        weigh(|i| &padded[i..][..width], taps, to);
+        weighted_sum(|i| &padded[i..][..width], taps, to);
     }
     let mut out = vec![0.0; image.len()];
     for (y, to) in out.chunks_exact_mut(width).enumerate() {
-        weigh(|i| &rows[place(y + i, reach, height) * width..][..width], taps, to);
+        weighted_sum(|i| &rows[place(y + i, reach, height) * width..][..width], taps, to);
     }
     out
 }
 
-/// The index in `0..length` that stands for `i - reach` when the border is a mirror.
+/// Returns the index in `0..length` that replaces `i - reach` if the border is a mirror.
 fn mirrored(i: usize, reach: usize, length: usize) -> usize {
     let period = 2 * length;
-    // So many periods are added that nothing is negative.
+    // Added periods keep the index from becoming negative.
     let place = (i + period * (reach / period + 1) - reach) % period;
     if place < length { place } else { period - 1 - place }
 }
 
-/// The sum over taps of values that are shifted, by 0 to twice the reach of the taps.
-fn weigh<'a>(shifted: impl Fn(usize) -> &'a [f32], taps: &[f32], to: &mut [f32]) {
+/// Sums shifted values, weighted by the taps. Shifts are 0 to twice the radius.
+fn weighted_sum<'a>(shifted: impl Fn(usize) -> &'a [f32], taps: &[f32], to: &mut [f32]) {
     let reach = taps.len() - 1;
     scale(shifted(reach), taps[0], to);
     for (i, tap) in taps.iter().enumerate().skip(1) {
@@ -71,7 +72,7 @@ fn add(a: &[f32], b: &[f32], tap: f32, to: &mut [f32]) {
     }
 }
 
-/// Half the differences of the neighbours right and left, and below and above; one-sided at the border.
+/// Returns the horizontal and the vertical gradient by central differences; one-sided at the border.
 pub(crate) fn gradient(image: &[f32], width: usize) -> [Vec<f32>; 2] {
     let height = image.len() / width.max(1);
     let mut across = vec![0.0; image.len()];
@@ -89,13 +90,13 @@ pub(crate) fn gradient(image: &[f32], width: usize) -> [Vec<f32>; 2] {
     [across, down]
 }
 
-/// The length of the gradient.
+/// Returns the magnitude of the gradient.
 pub(crate) fn slope(image: &[f32], width: usize) -> Vec<f32> {
     let [across, down] = gradient(image, width);
     across.iter().zip(&down).map(|(x, y)| (x * x + y * y).sqrt()).collect()
 }
 
-/// Every other pixel of every other row, after a blur that leaves nothing to alias.
+/// Halves the resolution, after a blur against aliasing.
 pub(crate) fn halved(image: &[f32], width: usize) -> (Vec<f32>, usize) {
     let smooth = blur(image, width, 1.0);
     let rows = smooth.chunks_exact(width).step_by(2);
@@ -115,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn a_blur_is_the_sum_over_its_taps_with_a_mirror_at_the_border() {
+    fn a_blur_equals_direct_convolution_with_a_mirrored_border() {
         let (width, height) = (9, 7);
         let image = noise(width * height, 2);
         for sigma in [0.5, 1.3, 6.0] {
@@ -142,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_survives_and_a_ramp_has_its_slope() {
+    fn a_constant_is_unchanged_and_a_ramp_has_its_gradient() {
         assert!(blur(&[0.7; 64], 8, 2.0).iter().all(|v| (v - 0.7).abs() < 1e-6));
         let ramp: Vec<f32> = (0..64_u8).map(|i| 3.0 * f32::from(i % 8) - 2.0 * f32::from(i / 8)).collect();
         let [across, down] = gradient(&ramp, 8);

@@ -114,7 +114,8 @@ impl FieldImage {
         self.cut([left, top], [width - left - right, height - top - bottom])
     }
 
-    /// Crops the image to a rectangle: left column and top row, then width and height. Points outside the rectangle are kept.
+    /// Crops the image to a rectangle: left column and top row, then width and height. Points outside the rectangle are
+    /// kept.
     #[must_use]
     pub fn cut(&self, [left, top]: [usize; 2], [width, height]: [usize; 2]) -> Self {
         fn part<T: Copy>(all: &[T], wide: usize, from: [usize; 2], size: [usize; 2]) -> Vec<T> {
@@ -138,8 +139,8 @@ impl FieldImage {
         }
     }
 
-    /// Resamples the image to pixels `factor` times as large: each is the mean of the area that it covers, and has the label of its
-    /// centre. A factor of 1 or less returns a copy.
+    /// Resamples the image to pixels `factor` times as large: each is the mean of the area that it covers, and has the
+    /// label of its centre. A factor of 1 or less returns a copy.
     #[must_use]
     pub fn coarsened(&self, factor: f64) -> Self {
         let (width, height) = (self.width, self.height());
@@ -175,7 +176,8 @@ impl FieldImage {
     }
 }
 
-/// Returns for each of `count` large pixels the first small pixel that it covers, and the weights of this and the next ones.
+/// Returns for each of `count` large pixels the first small pixel that it covers, and the weights of this and the next
+/// ones.
 fn weights(count: usize, factor: f64) -> Vec<(usize, Vec<f64>)> {
     let weight = |i: usize| {
         let (from, to) = (i as f64 * factor, (i + 1) as f64 * factor);

@@ -99,7 +99,8 @@ pub struct Report {
     pub fields: [Vec<String>; 2],
     /// Warnings: the same image on both sides, too few objects, ….
     pub warnings: Vec<String>,
-    /// Distinguishable if any test says so. One test errs in about 1 of 20 comparisons, this conclusion in about 1 of 8.
+    /// Distinguishable if any test concludes that. One test errs in about 1 of 20 comparisons, this conclusion in about 1 of
+    /// 8.
     pub conclusion: Conclusion,
     /// Classifier tests on nuclei, cells and patches, then on the nuclei of each group that both sides have.
     pub two_sample: Vec<Test<TwoSample>>,
@@ -147,8 +148,9 @@ impl Judge {
         self.compare_with(real, synthetic, &Control::NONE)
     }
 
-    /// As [`compare`](Self::compare), with progress reports and a stop flag. The phases are "classifying nuclei", "classifying
-    /// cells", "classifying patches", "classifying nuclei of group …" and twice "comparing nuclear texture".
+    /// As [`compare`](Self::compare), with progress reports and a stop flag. The phases are "classifying nuclei",
+    /// "classifying cells", "classifying patches", "classifying nuclei of group …" and twice "comparing nuclear
+    /// texture".
     ///
     /// # Errors
     /// As `compare`; [`Error::Stopped`] if the stop flag is set.
@@ -266,7 +268,8 @@ fn shared_groups<'a>(real: &'a [Field], synthetic: &[Field]) -> Vec<&'a str> {
     if shared.len() == 1 && real.iter().chain(synthetic).all(|f| f.group == shared[0]) { Vec::new() } else { shared }
 }
 
-/// The sides are distinguishable if the AUC exceeds the 95th percentile between real halves, and its interval excludes ½.
+/// The sides are distinguishable if the AUC exceeds the 95th percentile between real halves, and its interval excludes
+/// ½.
 fn of_areas(result: &TwoSample) -> Conclusion {
     let mut null = result.null.clone();
     let beyond_null = null.is_empty() || result.auc > quantile(&mut null, 0.95);

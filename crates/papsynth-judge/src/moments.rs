@@ -55,10 +55,11 @@ pub struct Descriptor {
     pub name: String,
     /// The descriptor in words.
     pub description: String,
-    /// Slope of real quantiles against synthetic ones: above 1 if the real ones vary more. 5th, 50th and 95th percentile over
-    /// draws of `n` nuclei from each side.
+    /// Slope of real quantiles against synthetic ones: above 1 if the real ones vary more. 5th, 50th and 95th
+    /// percentile over draws of `n` nuclei from each side.
     pub slope: [f64; 3],
-    /// Slope between two disjoint halves of the real fields: 0.25th, 50th and 99.75th percentile, widened for few fields.
+    /// Slope between two disjoint halves of the real fields: 0.25th, 50th and 99.75th percentile, widened for few
+    /// fields.
     pub null_slope: [f64; 3],
     /// Synthetic median minus real median, in standard deviations of the real nuclei: 5th, 50th and 95th percentile.
     pub shift: [f64; 3],
@@ -70,8 +71,8 @@ pub struct Descriptor {
     pub quantiles: Vec<[f64; 2]>,
 }
 
-/// Returns the slope of the least-squares line through the quantiles of `y` against those of `x`, as many as the shorter
-/// slice has values. NaN if `x` is constant.
+/// Returns the slope of the least-squares line through the quantiles of `y` against those of `x`, as many as the
+/// shorter slice has values. NaN if `x` is constant.
 #[must_use]
 pub fn qq_slope(x: &[f64], y: &[f64]) -> f64 {
     let n = x.len().min(y.len());
@@ -85,12 +86,13 @@ pub fn qq_slope(x: &[f64], y: &[f64]) -> f64 {
 /// Number of quantiles of a Q-Q plot.
 const DRAWN: usize = 60;
 
-/// Percentiles of the range between real halves: 1 of 200 is outside. There are twelve correlated numbers: slopes and shifts of
-/// six descriptors.
+/// Percentiles of the range between real halves: 1 of 200 is outside. There are twelve correlated numbers: slopes and
+/// shifts of six descriptors.
 const BAND: [f64; 3] = [0.0025, 0.5, 0.9975];
 
-/// Returns the factor that widens the range between halves of so many fields, because few fields underestimate the variation. It
-/// is the ratio of the 99.75th percentiles of Student's distribution, with `fields − 1` degrees of freedom, and of the normal one.
+/// Returns the factor that widens the range between halves of so many fields, because few fields underestimate the
+/// variation. It is the ratio of the 99.75th percentiles of Student's distribution, with `fields − 1` degrees of
+/// freedom, and of the normal one.
 fn widening(fields: usize) -> f64 {
     /// Of 2 to 8 fields.
     const FEW: [f64; 7] = [45.4, 5.02, 2.65, 1.99, 1.7, 1.54, 1.44];

@@ -1,4 +1,4 @@
-//! Nuclei: where they are, pixel by pixel.
+//! Segmentation of nuclei.
 
 use crate::filter::blur;
 use crate::image::NucleiAnnotation;
@@ -6,20 +6,20 @@ use crate::number::whole;
 use crate::region::{Region, components, flood};
 use crate::tree::{Blob, STEP, blobs};
 
-/// What is taken for a nucleus. All defaults are ours.
+/// Parameters of the segmentation of nuclei. The defaults are not from the paper.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct NucleiParams {
-    /// Smallest area, µm². Default 15: larger specks are rare.
+    /// Minimum area, µm². Default 15.
     pub smallest_um2: f64,
-    /// Largest area, µm². Default 400.
+    /// Maximum area, µm². Default 400.
     pub largest_um2: f64,
-    /// Smallest part of the ellipse of the same second moments that is filled, 0 to 1. Default 0.92.
+    /// Minimum area over that of the ellipse of the same second moments, 0 to 1. Default 0.92.
     pub least_ellipse: f64,
-    /// Smallest area over that of the convex hull, 0 to 1. Default 0.86.
+    /// Minimum area over that of the convex hull, 0 to 1. Default 0.86.
     pub least_solidity: f64,
-    /// Least difference of absorbance between inside and what lies around, above 0. Default 0.10.
+    /// Minimum difference of absorbance between a nucleus and its surroundings, above 0. Default 0.10.
     pub least_contrast: f64,
-    /// Least steepness of the rim, absorbance a µm. Default 0.05.
+    /// Minimum gradient of absorbance at the border, 1/µm. Default 0.05.
     pub least_steepness: f64,
 }
 
@@ -36,27 +36,27 @@ impl Default for NucleiParams {
     }
 }
 
-/// Blur before thresholds are set, µm: what noise of single pixels needs, and less than a rim's width.
+/// Blur before thresholding, µm: enough against pixel noise, and less than the width of a border.
 const SMOOTH_UM: f64 = 0.3;
 
-/// Thresholds begin here: nuclei are darker, and empty slide is left out of the search.
+/// Lowest threshold, absorbance: nuclei are darker, and empty slide is excluded.
 const LIGHTEST: f32 = 0.10;
 
-/// How far a marked point may lie from a nucleus's centre, µm.
+/// Maximum distance between an annotated point and the centre of its nucleus, µm.
 const MARK_UM: f64 = 4.0;
 
-/// What lies around a nucleus begins and ends so far from its rim, µm.
+/// Inner and outer distance of the surroundings from the border of a nucleus, µm.
 const AROUND_UM: [f64; 2] = [0.8, 2.5];
 
-/// The nuclei of a picture, by their centres from top to bottom. No two have a pixel in common.
+/// Returns the nuclei of an image, ordered by their first pixels. They do not overlap.
 pub(crate) fn nuclei(
     absorbance: &[f32],
     width: usize,
     pixel_um: f64,
-    known: &NucleiAnnotation,
+    annotation: &NucleiAnnotation,
     params: &NucleiParams,
 ) -> Vec<Region> {
-    let mut regions = match known {
+    let mut regions = match annotation {
         NucleiAnnotation::Masks(labels) => masks(labels, width),
         NucleiAnnotation::None => found(absorbance, width, pixel_um, None, params),
         NucleiAnnotation::Points(points) => found(absorbance, width, pixel_um, Some(points), params),
@@ -66,7 +66,7 @@ pub(crate) fn nuclei(
     regions
 }
 
-/// The largest connected part of each label.
+/// Returns the largest connected component of each label.
 fn masks(labels: &[u32], width: usize) -> Vec<Region> {
     let mut largest = std::collections::BTreeMap::<u32, Region>::new();
     for region in components(labels, width) {
@@ -89,7 +89,7 @@ fn found(
     let px2 = pixel_um * pixel_um;
     let (smallest, largest) = (params.smallest_um2 / px2, params.largest_um2 / px2);
     let all = blobs(&smooth, width, LIGHTEST, largest * 1.5);
-    // Marked nuclei are there however faint; of them it is only asked which threshold shows them best.
+    // An annotated nucleus exists even if it is faint, so the criteria are less strict.
     let leniency = if points.is_some() { 0.5 } else { 1.0 };
     let score = |b: &Blob| b.steepness * b.ellipse * b.ellipse * b.ellipse * b.ellipse;
     let mut candidates: Vec<usize> = (0..all.len())
@@ -139,7 +139,7 @@ fn found(
     regions
 }
 
-/// The nearest point to a blob, not further from its centre than a mark may be, that has no nucleus yet.
+/// Returns the nearest annotated point to a blob that has no nucleus yet and is not too far.
 fn nearest_mark(points: &[[f64; 2]], marked: &[bool], blob: &Blob, pixel_um: f64) -> Option<usize> {
     let reach = (MARK_UM / pixel_um).max(0.7 * (blob.area / std::f64::consts::PI).sqrt());
     let far = |i: usize| crate::region::distance(points[i], blob.centre);
@@ -147,7 +147,7 @@ fn nearest_mark(points: &[[f64; 2]], marked: &[bool], blob: &Blob, pixel_um: f64
     near.min_by(|&a, &b| far(a).total_cmp(&far(b)))
 }
 
-/// Mean absorbance inside above the median of what lies around.
+/// Returns the mean absorbance of a region minus the median of its surroundings.
 fn contrast(absorbance: &[f32], region: &Region, pixel_um: f64) -> f64 {
     let inner =
         region.pixels.iter().map(|p| f64::from(absorbance[*p as usize])).sum::<f64>() / region.pixels.len() as f64;
@@ -165,7 +165,7 @@ mod tests {
 
     const PIXEL_UM: f64 = 0.33;
 
-    /// Discs of a radius and absorbance on something pale, with rims of 1.2 pixels.
+    /// Discs of a radius and absorbance on a pale background, with a blur of 1.2 pixels.
     fn image(discs: &[([f64; 2], f64, f64)]) -> Vec<f32> {
         let at = |i: usize| {
             let rim = |(centre, radius, a): &([f64; 2], f64, f64)| {
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn a_disc_is_found_to_the_middle_of_its_rim() {
+    fn the_border_of_a_disc_is_at_half_its_absorbance() {
         for radius in [8.0, 12.0, 20.0] {
             let image = image(&[([80.2, 70.7], radius, 0.3)]);
             let found = nuclei(&image, 200, PIXEL_UM, &NucleiAnnotation::None, &NucleiParams::default());
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_small_too_large_too_faint_or_too_long_is_none() {
+    fn small_large_faint_and_long_objects_are_not_nuclei() {
         assert_eq!(areas(&image(&[([80.0, 70.0], 5.0, 0.3)]), &NucleiAnnotation::None), [0; 0]);
         assert_eq!(areas(&image(&[([80.0, 70.0], 40.0, 0.3)]), &NucleiAnnotation::None), [0; 0]);
         assert_eq!(areas(&image(&[([80.0, 70.0], 10.0, 0.06)]), &NucleiAnnotation::None), [0; 0]);
@@ -205,11 +205,11 @@ mod tests {
     }
 
     #[test]
-    fn points_choose_what_is_taken_and_masks_are_taken_as_they_are() {
+    fn points_select_nuclei_and_masks_are_used_unchanged() {
         let image = image(&[([50.0, 70.0], 10.0, 0.3), ([120.0, 70.0], 12.0, 0.4), ([170.0, 70.0], 10.0, 0.07)]);
         assert_eq!(areas(&image, &NucleiAnnotation::None).len(), 2);
         assert_eq!(areas(&image, &NucleiAnnotation::Points(vec![[121.0, 72.0], [10.0, 10.0]])).len(), 1);
-        // Marked nuclei may be fainter.
+        // Annotated nuclei may be fainter.
         assert_eq!(areas(&image, &NucleiAnnotation::Points(vec![[170.0, 70.0]])).len(), 1);
         let mut labels = vec![0; image.len()];
         for y in 20..40 {
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_are_parted() {
+    fn adjacent_nuclei_are_separated() {
         let image = image(&[([60.0, 70.0], 10.0, 0.3), ([84.0, 70.0], 10.0, 0.35)]);
         assert_eq!(areas(&image, &NucleiAnnotation::None).len(), 2);
     }

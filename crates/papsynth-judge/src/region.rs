@@ -1,15 +1,15 @@
-//! Connected regions and their shape.
+//! Connected regions and their shapes.
 
 use crate::number::id;
 
-/// Pixels of one object, in the order in which they were found.
+/// Pixels of one object.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Region {
     /// Indices into the image.
     pub(crate) pixels: Vec<u32>,
-    /// Columns of the image.
+    /// Width of the image.
     pub(crate) width: usize,
-    /// Rows of it.
+    /// Height of the image.
     pub(crate) height: usize,
 }
 
@@ -20,7 +20,7 @@ pub(crate) struct Shape {
     pub(crate) centre: [f64; 2],
     /// √(1 − b²/a²) of the ellipse of the same second moments.
     pub(crate) eccentricity: f64,
-    /// Direction of its long axis, radians.
+    /// Direction of the long axis, radians.
     pub(crate) direction: f64,
     /// Area over that of the convex hull.
     pub(crate) solidity: f64,
@@ -28,7 +28,7 @@ pub(crate) struct Shape {
     pub(crate) circularity: f64,
 }
 
-/// Sums over pixels: their number, x, y, x², xy and y².
+/// Sums over pixels of 1, x, y, x², xy and y².
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Sums([f64; 6]);
 
@@ -51,49 +51,49 @@ impl Sums {
         [x / n, y / n]
     }
 
-    /// Second central moments xx, xy and yy. A pixel is a square, not a point.
+    /// Returns the second central moments xx, xy and yy of square pixels.
     pub(crate) fn second(&self) -> [f64; 3] {
         let ([n, _, _, xx, xy, yy], [x, y]) = (self.0, self.centre());
         [xx / n - x * x + 1.0 / 12.0, xy / n - x * y, yy / n - y * y + 1.0 / 12.0]
     }
 }
 
-/// A region in a box of its own, with a margin.
+/// The bounding box of a region, with a margin.
 pub(crate) struct Tile<'a> {
     region: &'a Region,
-    /// Whether each pixel of the box is in the region.
+    /// Whether a pixel of the box is in the region.
     pub(crate) inside: Vec<bool>,
     wide: usize,
-    /// Place of the upper left pixel, which may be outside the image.
+    /// Position of the upper left pixel, which may be outside the image.
     corner: [i64; 2],
 }
 
 impl Tile<'_> {
-    /// Where a pixel of the box is in the image; none outside it.
+    /// Returns the index in the image of a pixel of the box; none outside the image.
     pub(crate) fn place(&self, i: usize) -> Option<usize> {
         let x = usize::try_from((i % self.wide) as i64 + self.corner[0]).ok()?;
         let y = usize::try_from((i / self.wide) as i64 + self.corner[1]).ok()?;
         (x < self.region.width && y < self.region.height).then(|| y * self.region.width + x)
     }
 
-    /// Distance of each pixel inside to the nearest outside, 0 outside.
+    /// Returns the distance of each inner pixel to the nearest outer one; 0 outside.
     pub(crate) fn depths(&self) -> Vec<f32> {
         distance_inside(&self.inside, self.wide)
     }
 
-    /// Distance of each pixel outside to the nearest inside, 0 inside.
+    /// Returns the distance of each outer pixel to the nearest inner one; 0 inside.
     pub(crate) fn heights(&self) -> Vec<f32> {
         self.distances(|i| !self.inside[i])
     }
 
-    /// Distance of each pixel where `counts` holds to the nearest where it does not.
+    /// Returns the distance of each pixel for which `counts` is true to the nearest one for which it is false.
     pub(crate) fn distances(&self, counts: impl Fn(usize) -> bool) -> Vec<f32> {
         distance_inside(&(0..self.inside.len()).map(counts).collect::<Vec<_>>(), self.wide)
     }
 }
 
 impl Region {
-    /// Whether it touches the image's border.
+    /// Returns whether the region touches the border of the image.
     pub(crate) fn at_border(&self) -> bool {
         self.pixels.iter().any(|&p| {
             let (x, y) = self.place(p);
@@ -105,9 +105,9 @@ impl Region {
         (pixel as usize % self.width, pixel as usize / self.width)
     }
 
-    /// Its pixels with `margin` pixels around them.
+    /// Returns the bounding box with a margin.
     pub(crate) fn tile(&self, margin: usize) -> Tile<'_> {
-        // The last two lie beyond it.
+        // Left and top inclusive, right and bottom exclusive.
         let around = [usize::MAX, usize::MAX, 0, 0];
         let [left, top, right, bottom] = self.pixels.iter().fold(around, |[l, t, r, b], &p| {
             let (x, y) = self.place(p);
@@ -122,7 +122,7 @@ impl Region {
         Tile { region: self, inside, wide, corner: [left, top].map(|v| v as i64 - margin as i64) }
     }
 
-    /// The same without holes.
+    /// Returns the region without holes.
     pub(crate) fn filled(&self) -> Self {
         let tile = self.tile(1);
         let inside = &tile.inside;
@@ -157,23 +157,23 @@ impl Region {
         }
     }
 
-    /// The corners of its outer border between pixels, anticlockwise on the screen, of its part with the first pixel.
+    /// Returns the pixel corners along the outer border, anticlockwise on the screen.
     pub(crate) fn outline(&self) -> Vec<[f64; 2]> {
         let Tile { inside, wide, corner: [left, top], .. } = self.tile(1);
-        // The topmost pixel's leftmost: above it there is nothing.
+        // The leftmost pixel of the topmost row: the pixel above is outside.
         let start = inside.iter().position(|i| *i).unwrap_or(0);
         let at = |x: i64, y: i64| -> bool {
             usize::try_from(y * wide as i64 + x).ok().and_then(|i| inside.get(i)).is_some_and(|i| *i)
         };
         let first = [(start % wide) as i64, (start / wide) as i64];
-        // Corners of pixels are walked along with the inside to the left hand: down first.
+        // The path keeps the region to the left, and starts downwards.
         let mut corner = first;
         let mut step: [i64; 2] = [0, 1];
         let mut points = Vec::new();
         loop {
             points.push([(corner[0] + left) as f64 - 0.5, (corner[1] + top) as f64 - 0.5]);
             corner = [corner[0] + step[0], corner[1] + step[1]];
-            // The two pixels ahead, to the left and to the right of the way.
+            // The two pixels ahead, to the left and to the right of the path.
             let (dx, dy) = (step[0], step[1]);
             let ahead_left = at(corner[0] + (dx + dy - 1) / 2, corner[1] + (dy - dx - 1) / 2);
             let ahead_right = at(corner[0] + (dx - dy - 1) / 2, corner[1] + (dy + dx - 1) / 2);
@@ -189,17 +189,17 @@ impl Region {
     }
 }
 
-/// The outline smoothed over this many of its corners before it is measured: steps of pixels are no perimeter.
+/// Number of corners over which an outline is smoothed before its length is measured, because pixel steps are too long.
 const STEPS: usize = 5;
 
-/// Length of a closed line of pixels' corners, without its steps.
+/// Returns the length of a smoothed closed outline.
 fn perimeter(outline: &[[f64; 2]]) -> f64 {
     let smooth = smoothed(outline, STEPS);
     let next = smooth.iter().cycle().skip(1);
     smooth.iter().zip(next).map(|(a, b)| distance(*a, *b)).sum()
 }
 
-/// The running mean of a closed line over `count` of its points.
+/// Returns the running mean of a closed line over `count` points.
 pub(crate) fn smoothed(line: &[[f64; 2]], count: usize) -> Vec<[f64; 2]> {
     let n = line.len();
     if n <= count {
@@ -217,7 +217,7 @@ pub(crate) fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (dx * dx + dy * dy).sqrt()
 }
 
-/// Area of the convex hull of points, by Andrew's monotone chain.
+/// Returns the area of the convex hull of points, by Andrew's monotone chain.
 fn hull_area(points: &[[f64; 2]]) -> f64 {
     let mut points = points.to_vec();
     points.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
@@ -239,7 +239,7 @@ fn hull_area(points: &[[f64; 2]]) -> f64 {
     0.5 * hull.iter().zip(next).map(|(a, b)| a[0] * b[1] - b[0] * a[1]).sum::<f64>().abs()
 }
 
-/// The connected regions of equal values, by edges, in the order of their first pixels; none of the default value.
+/// Returns the 4-connected regions of equal values, except the default value, in the order of their first pixels.
 pub(crate) fn components<T: PartialEq + Default>(values: &[T], width: usize) -> Vec<Region> {
     let mut seen = vec![false; values.len()];
     let mut regions = Vec::new();
@@ -251,7 +251,7 @@ pub(crate) fn components<T: PartialEq + Default>(values: &[T], width: usize) -> 
     regions
 }
 
-/// The pixels left, right, above and below one.
+/// Returns the pixels left, right, above and below a pixel.
 pub(crate) fn neighbours(p: usize, width: usize, length: usize) -> impl Iterator<Item = usize> {
     let x = p % width;
     let around = [
@@ -263,7 +263,7 @@ pub(crate) fn neighbours(p: usize, width: usize, length: usize) -> impl Iterator
     around.into_iter().flatten()
 }
 
-/// What is connected with a pixel through its edges, of those where `inside` holds.
+/// Returns the 4-connected region of a pixel in which `inside` is true.
 pub(crate) fn flood(start: usize, width: usize, seen: &mut [bool], inside: impl Fn(usize) -> bool) -> Region {
     let mut pixels = vec![id(start)];
     seen[start] = true;
@@ -280,8 +280,8 @@ pub(crate) fn flood(start: usize, width: usize, seen: &mut [bool], inside: impl 
     Region { pixels, width, height: seen.len() / width }
 }
 
-/// Distance of every pixel to the nearest one where `inside` does not hold, pixels, 0 there; what is beyond the image counts as
-/// inside. Exact (Felzenszwalb and Huttenlocher, doi:10.4086/toc.2012.v008a019).
+/// Returns the exact distance of each pixel to the nearest one outside, 0 outside. Pixels beyond the image count as
+/// inside (Felzenszwalb and Huttenlocher, doi:10.4086/toc.2012.v008a019).
 fn distance_inside(inside: &[bool], width: usize) -> Vec<f32> {
     let height = inside.len() / width.max(1);
     let far = ((width + height) * (width + height)) as f64;
@@ -301,7 +301,8 @@ fn distance_inside(inside: &[bool], width: usize) -> Vec<f32> {
     squares.iter().map(|s| crate::number::single(s.sqrt())).collect()
 }
 
-/// Squares of distances along a line by the lower envelope of parabolas: the middle of each, and from where on it is the lowest.
+/// Computes squared distances along a line from the lower envelope of parabolas. `hull` holds the vertex of each
+/// parabola and the start of its interval.
 fn transform(values: &[f64], hull: &mut Vec<(usize, f64)>, mut put: impl FnMut(usize, f64)) {
     hull.clear();
     for (q, value) in values.iter().enumerate() {
@@ -341,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn ellipses_have_their_area_centre_and_shape() {
+    fn area_centre_and_shape_of_ellipses_are_exact() {
         let (sin, cos) = (libm::sin(0.5), libm::cos(0.5));
         for (a, b) in [(30.0, 30.0), (40.0, 20.0)] {
             let inside = |x: f64, y: f64| {
@@ -361,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn a_square_is_less_round_and_a_cross_less_solid() {
+    fn circularity_of_a_square_and_solidity_of_a_cross_are_exact() {
         let square = region(60, 60, |x, y| (10.0..40.0).contains(&x) && (10.0..40.0).contains(&y));
         assert!((square.shape().circularity - std::f64::consts::FRAC_PI_4).abs() < 0.06, "{:?}", square.shape());
         assert_eq!(square.outline().len(), 120);
@@ -389,7 +390,7 @@ mod tests {
     }
 
     #[test]
-    fn distances_are_those_to_the_nearest_pixel_outside() {
+    fn distances_equal_a_search_over_all_pixels() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(4);
         let (width, height) = (23, 17);
         let inside: Vec<bool> = (0..width * height).map(|_| rng.next_u64() % 9 != 0).collect();

@@ -1,48 +1,49 @@
-//! Statistics of numbers that are 0 where there are too few of them: what is not there has nothing to measure.
+//! Statistics that are 0 for too few values.
 
 use portable_numerics::statistics;
 
-/// The values in order.
+/// Returns the sorted values.
 pub(crate) fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     let mut values: Vec<f64> = values.into_iter().collect();
     values.sort_unstable_by(f64::total_cmp);
     values
 }
 
-/// [`statistics::quantile`]; 0 of none. Sorts the values.
+/// Returns [`statistics::quantile`]; 0 for no values. Sorts the values.
 pub(crate) fn quantile(values: &mut [f64], q: f64) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     of_sorted(values, q)
 }
 
-/// As [`quantile`], of values in order.
+/// As [`quantile`], for sorted values.
 pub(crate) fn of_sorted(values: &[f64], q: f64) -> f64 {
     if values.is_empty() { 0.0 } else { statistics::quantile_of_sorted(values, q) }
 }
 
-/// The middle value; 0 of none. Sorts the values.
+/// Returns the median; 0 for no values. Sorts the values.
 pub(crate) fn median(values: &mut [f64]) -> f64 {
     quantile(values, 0.5)
 }
 
-/// Mean; 0 of none.
+/// Returns the mean; 0 for no values.
 pub(crate) fn mean(values: &[f64]) -> f64 {
     if values.is_empty() { 0.0 } else { statistics::mean(values) }
 }
 
-/// Standard deviation of a sample; 0 of fewer than two.
+/// Returns the standard deviation of a sample; 0 for fewer than two values.
 pub(crate) fn deviation(values: &[f64]) -> f64 {
     if values.len() < 2 { 0.0 } else { statistics::deviation(values) }
 }
 
-/// The area under the ROC curve: the probability that a score of `high` exceeds one of `low`, ties counted half; ½ if one is empty.
+/// Returns the area under the ROC curve: the probability that a score of `high` exceeds one of `low`. Ties count half.
+/// ½ if one slice is empty.
 #[must_use]
 pub fn auc(low: &[f64], high: &[f64]) -> f64 {
     let weigh = |scores: &[f64], label: bool| scores.iter().map(|&s| (s, label, 1.0)).collect::<Vec<_>>();
     weighted_auc(&mut [weigh(low, false), weigh(high, true)].concat())
 }
 
-/// Slope of the least-squares line through points; NaN if `x` does not vary.
+/// Returns the slope of the least-squares line through points; NaN if `x` is constant.
 pub(crate) fn line_slope(x: &[f64], y: &[f64]) -> f64 {
     let (mx, my) = (mean(x), mean(y));
     let (xy, xx) =
@@ -50,7 +51,7 @@ pub(crate) fn line_slope(x: &[f64], y: &[f64]) -> f64 {
     if xx > 0.0 { xy / xx } else { f64::NAN }
 }
 
-/// As [`auc`], of scores with their side (whether they are of the high one) and weight. Sorts them.
+/// As [`auc`], for scores with side (`true`: high) and weight. Sorts the scores.
 pub(crate) fn weighted_auc(scores: &mut [(f64, bool, f64)]) -> f64 {
     scores.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let (mut low, mut high, mut area) = (0.0, 0.0, 0.0);
@@ -73,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_auc_is_the_part_of_pairs_in_order_and_weights_stand_for_copies() {
+    fn the_auc_is_the_fraction_of_ordered_pairs_and_weights_equal_copies() {
         assert_eq!(auc(&[], &[1.0]), 0.5);
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
         let scores: Vec<(f64, bool, usize)> =
@@ -88,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn of_too_few_values_all_is_0() {
+    fn statistics_of_too_few_values_are_0() {
         assert_eq!([quantile(&mut [], 0.3), median(&mut []), mean(&[]), deviation(&[7.0])], [0.0; 4]);
     }
 }

@@ -1,18 +1,18 @@
-//! Small drawings as SVG, with plain text and no fonts of their own.
+//! Small plots as SVG, without embedded fonts.
 
 use std::fmt::Write;
 
-/// Colour of real things, and of synthetic ones: told apart with defective colour vision too (Okabe and Ito).
+/// Colours of real and synthetic data, distinguishable with colour vision deficiency (Okabe and Ito).
 pub const COLOURS: [&str; 2] = ["#0072b2", "#d55e00"];
 
-/// Columns and rows of a drawing among others on a page.
+/// Width and height of a small plot.
 const SMALL: [f64; 2] = [380.0, 260.0];
 const LEFT: f64 = 52.0;
 const BOTTOM: f64 = 40.0;
 const TOP: f64 = 24.0;
 const RIGHT: f64 = 10.0;
 
-/// Axes with things on them.
+/// A plot with axes.
 #[derive(Debug, Clone)]
 pub struct Plot {
     size: [f64; 2],
@@ -22,13 +22,13 @@ pub struct Plot {
 }
 
 impl Plot {
-    /// Axes that hold all finite ones of these values, with a little room; names of the drawing and of both axes.
+    /// Returns a plot for the range of all finite values, with a margin; names are title, x axis and y axis.
     pub(crate) fn new(names: [&str; 3], x: impl Iterator<Item = f64>, y: impl Iterator<Item = f64>) -> Self {
         let [title, x_name, y_name] = names;
         Self::sized(SMALL, title, x_name, y_name, range(x), range(y))
     }
 
-    /// Axes from one value to another, in a drawing of so many columns and rows.
+    /// Returns a plot of a size, with axes for the ranges `x` and `y`.
     #[must_use]
     pub fn sized(size: [f64; 2], title: &str, x_name: &str, y_name: &str, x: [f64; 2], y: [f64; 2]) -> Self {
         let mut plot = Self { size, x, y, body: String::new() };
@@ -78,24 +78,24 @@ impl Plot {
         path
     }
 
-    /// A line through points, broken where one is not finite.
+    /// Draws a line through points, interrupted at points that are not finite.
     pub fn line(&mut self, points: impl Iterator<Item = [f64; 2]>, colour: &str) {
         let path = self.path(points);
         self.put(&format!(r#"<path d="{path}" fill="none" stroke="{colour}" stroke-width="1.8"/>"#));
     }
 
-    /// A pale area between two lines.
+    /// Fills the area between two lines.
     pub fn band(&mut self, lower: &[[f64; 2]], upper: &[[f64; 2]], colour: &str) {
         let path = self.path(lower.iter().chain(upper.iter().rev()).copied().filter(known));
         self.put(&format!(r#"<path d="{path}Z" fill="{colour}" fill-opacity="0.15" stroke="none"/>"#));
     }
 
-    /// A dot at each point.
+    /// Draws a dot at each point.
     pub fn dots(&mut self, points: impl Iterator<Item = [f64; 2]>, colour: &str) {
         self.circles(points, &format!(r#"fill="{colour}" fill-opacity="0.7""#));
     }
 
-    /// A ring at each point.
+    /// Draws a ring at each point.
     pub fn rings(&mut self, points: impl Iterator<Item = [f64; 2]>, colour: &str) {
         self.circles(points, &format!(r#"fill="none" stroke="{colour}""#));
     }
@@ -107,13 +107,13 @@ impl Plot {
         }
     }
 
-    /// A dashed line between two points.
+    /// Draws a dashed line between two points.
     pub fn dashes(&mut self, from: [f64; 2], to: [f64; 2]) {
         let path = self.path([from, to].into_iter());
         self.put(&format!(r##"<path d="{path}" stroke="#888" stroke-dasharray="4 3"/>"##));
     }
 
-    /// The drawing as a part of an HTML page, whose style sheet says how text looks.
+    /// Returns the plot for an HTML page, whose style sheet sets the fonts.
     #[must_use]
     pub fn finish(self) -> String {
         let [width, height] = self.size;
@@ -123,7 +123,7 @@ impl Plot {
         )
     }
 
-    /// The drawing as a file of its own.
+    /// Returns the plot as an SVG file.
     #[must_use]
     pub fn document(self) -> String {
         let [width, height] = self.size;
@@ -150,7 +150,7 @@ fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     [low - room, high + room]
 }
 
-/// Round numbers within a range.
+/// Returns round numbers in a range.
 fn ticks([low, high]: [f64; 2]) -> Vec<f64> {
     let rough = (high - low) / 5.0;
     let ten = libm::pow(10.0, libm::log10(rough).floor());
@@ -159,7 +159,7 @@ fn ticks([low, high]: [f64; 2]) -> Vec<f64> {
     (0..12).map(|i| (first + f64::from(i)) * step).filter(|v| *v <= high).collect()
 }
 
-/// A number in as many digits as are read.
+/// Formats a number with a suitable number of digits.
 pub(crate) fn short(value: f64) -> String {
     let size = value.abs();
     match [100.0, 10.0, 1.0, 0.001].iter().position(|least| size >= *least) {
@@ -170,7 +170,7 @@ pub(crate) fn short(value: f64) -> String {
     }
 }
 
-/// Text that means itself in HTML.
+/// Escapes text for HTML.
 pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -1,57 +1,57 @@
-//! Dark blobs at every threshold at once: the component tree of absorbance.
+//! The component tree of absorbance: dark blobs at all thresholds.
 
 use crate::number::{id, nearest, whole};
 use crate::region::{Sums, neighbours};
 
-/// Step between thresholds, absorbance: what a level of 8 bits is at 110 of 255.
+/// Step between thresholds, absorbance: one grey level of 8 bits at level 110.
 pub(crate) const STEP: f32 = 0.01;
 
 /// A connected region darker than a threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Blob {
-    /// Its threshold, in steps.
+    /// Threshold, in steps.
     pub(crate) level: u16,
-    /// One of its darkest pixels.
+    /// One of the darkest pixels.
     pub(crate) pixel: u32,
-    /// Pixels.
+    /// Number of pixels.
     pub(crate) area: f64,
-    /// Sum of absorbance over its pixels.
+    /// Sum of absorbance.
     pub(crate) sum: f64,
     /// Centre.
     pub(crate) centre: [f64; 2],
-    /// Area over that of the ellipse of the same second moments: 1 of an ellipse, less of anything else.
+    /// Area over that of the ellipse of the same second moments: 1 for an ellipse, less for other shapes.
     pub(crate) ellipse: f64,
-    /// How steep its rim is: absorbance a pixel, by how fast its area grows with the threshold.
+    /// Gradient of absorbance at the border, 1/px, from the growth of the area with the threshold.
     pub(crate) steepness: f64,
-    /// The blob around it, at the next lower threshold where there is one.
+    /// Enclosing blob at the next lower threshold that has one.
     pub(crate) parent: Option<u32>,
-    /// Its largest part at the next higher threshold.
+    /// Largest enclosed blob at the next higher threshold.
     largest: Option<u32>,
 }
 
-/// How many thresholds below and above its own a blob's growth is looked at.
+/// Thresholds below and above that of a blob over which its growth is measured.
 const AROUND: u16 = 3;
 
 const NONE: u32 = u32::MAX;
 
-/// A tree with the sums of its region.
+/// A connected region during construction.
 #[derive(Default)]
 struct Root {
     sums: Sums,
-    /// Of absorbance.
+    /// Sum of absorbance.
     sum: f64,
     pixel: u32,
-    /// Blobs that wait for one around them.
+    /// Blobs without an enclosing blob.
     waiting: Vec<u32>,
     touched: u16,
 }
 
-/// The level of a pixel.
+/// Returns the threshold level of a pixel.
 fn level(absorbance: f32, most: u16) -> u16 {
     u16::try_from(whole(f64::from(absorbance / STEP))).unwrap_or(u16::MAX).min(most)
 }
 
-/// Every blob darker than `darkest..lightest` of at most `largest` pixels, the darkest first.
+/// Returns all blobs of at most `largest` pixels that are darker than `lightest`, the darkest first.
 pub(crate) fn blobs(absorbance: &[f32], width: usize, lightest: f32, largest: f64) -> Vec<Blob> {
     const MOST: u16 = 250;
     let least = u16::try_from(nearest(f64::from(lightest / STEP))).unwrap_or(0).max(1);
@@ -95,7 +95,7 @@ pub(crate) fn blobs(absorbance: &[f32], width: usize, lightest: f32, largest: f6
         }
         for &candidate in &touched {
             let root = &mut roots[find(&mut parents, candidate) as usize];
-            // The first to come makes the blob of all that were joined.
+            // One of the joined candidates creates their common blob.
             if std::mem::take(&mut root.touched) == 0 {
                 continue;
             }
@@ -151,13 +151,14 @@ fn join(parents: &mut [u32], roots: &mut [Root], a: u32, b: u32) -> u32 {
     into
 }
 
-/// Area over that of the ellipse of the same second moments.
+/// Returns the area over that of the ellipse of the same second moments.
 fn ellipse(sums: &Sums) -> f64 {
     let [xx, xy, yy] = sums.second();
     sums.area() / (4.0 * std::f64::consts::PI * (xx * yy - xy * xy).max(1e-3).sqrt())
 }
 
-/// A rim of slope g around a region of perimeter P moves outwards by dA/g when the threshold falls by dA, and adds P dA/g pixels.
+/// Returns the gradient at the border. With a gradient g and a perimeter P, lowering the threshold by dA adds P dA/g
+/// pixels.
 fn steepness(blobs: &[Blob], i: usize) -> f64 {
     let blob = &blobs[i];
     let mut outer = blob;
@@ -169,11 +170,11 @@ fn steepness(blobs: &[Blob], i: usize) -> f64 {
         outer = parent;
         fallen = blob.level - parent.level;
     }
-    // What has no blob around it becomes too large at the next threshold: its rim is no rim.
+    // A blob without an enclosing blob becomes too large at the next threshold: it has no border.
     if outer.parent.is_none() && fallen < AROUND {
         return 0.0;
     }
-    // The largest part that is still there when the threshold has risen; nothing, if none is.
+    // The largest enclosed blob at the raised threshold, if there is one.
     let mut inner = Some(blob);
     while let Some(part) = inner.filter(|part| part.level - blob.level < AROUND) {
         inner = part.largest.map(|p| &blobs[p as usize]);
@@ -193,7 +194,7 @@ mod tests {
     use crate::region::flood;
 
     #[test]
-    fn every_blob_is_what_is_connected_at_its_threshold() {
+    fn blobs_equal_the_connected_regions_at_their_thresholds() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(8);
         let width = 31;
         let noise: Vec<f32> =
@@ -221,7 +222,7 @@ mod tests {
 
     #[test]
     fn the_steepness_of_a_cone_is_its_slope() {
-        // A radial ramp of 0.02 a pixel from 0.1 outside to 0.6 in the middle.
+        // A radial ramp of 0.02 a pixel from 0.1 outside to 0.6 in the centre.
         let width = 90;
         let ramp = |i: usize| {
             let (x, y) = ((i % width) as f64 - 45.0, (i / width) as f64 - 45.0);

@@ -91,8 +91,8 @@ pub struct DistinguishingFeature {
     pub description: String,
     /// Kind of the feature.
     pub kind: FeatureKind,
-    /// Permutation importance as a fraction of that of all features, 0 to 1. All importances are 0 if the mean score of the
-    /// synthetic side does not exceed that of the real side.
+    /// Permutation importance as a fraction of that of all features, 0 to 1. All importances are 0 if the mean score of
+    /// the synthetic side does not exceed that of the real side.
     pub importance: f64,
     /// AUC of this feature without the others: above ½ if it is larger on the synthetic side.
     pub single_auc: f64,
@@ -104,7 +104,7 @@ pub struct DistinguishingFeature {
     pub between_fields: [f64; 2],
 }
 
-/// With fewer fields on a side the AUC is uncertain, and can lie below chance level.
+/// With fewer fields on a side the AUC is uncertain, and can be below chance level.
 const FEW_FIELDS: usize = 8;
 
 /// Returns an AUC in words.
@@ -161,7 +161,8 @@ impl<'a> Sample<'a> {
         [false, true].map(of)
     }
 
-    /// Returns the number of folds: at most one for each field of the smaller side, and at least 2; none if that is impossible.
+    /// Returns the number of folds: at most one for each field of the smaller side, and at least 2; none if that is
+    /// impossible.
     fn fold_count(&self, folds: usize) -> Option<usize> {
         let folds = self.with_rows().iter().map(Vec::len).fold(folds, usize::min);
         (folds >= 2).then_some(folds)
@@ -228,8 +229,8 @@ fn area(sample: &Sample, scores: &[f64]) -> f64 {
     auc(&real, &synthetic)
 }
 
-/// Tests whether a classifier can distinguish the rows of two sets of fields; none if a side has fewer than two fields with
-/// rows. `name` is the name of the phase in progress reports.
+/// Tests whether a classifier can distinguish the rows of two sets of fields; none if a side has fewer than two fields
+/// with rows. `name` is the name of the phase in progress reports.
 ///
 /// # Errors
 /// [`Error::Stopped`] if the stop flag of `control` is set.
@@ -366,7 +367,7 @@ fn distinguishing_features(
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ ((*column as u64 + 1) << 20));
         let scores = scores(rows, folds, phase, |part| shuffle(&mut part.columns[*column], &mut rng))?;
         phase.step()?;
-        // Without a separation there is nothing to lose: every difference is noise.
+        // Without a separation, differences are noise.
         Ok(if separated > 0.0 { (separated - separation(rows, &scores)).max(0.0) } else { 0.0 })
     };
     let losses: Vec<f64> = order.par_iter().enumerate().map(loss).collect::<Result<_, Error>>()?;
@@ -444,8 +445,8 @@ impl Rows {
 
 /// A random forest that separates the sides.
 ///
-/// The trees regress on 0 (real) and 1 (synthetic): the split of least variance is that of least Gini impurity, and the mean
-/// of a leaf is a fraction, whereas the trees of a classifier vote.
+/// The trees regress on 0 (real) and 1 (synthetic): the split of least variance is that of least Gini impurity, and the
+/// mean of a leaf is a fraction, whereas the trees of a classifier vote.
 struct Forest(Vec<Block>);
 
 impl Forest {

@@ -1,11 +1,11 @@
-//! Recovers the parameters of recipes it has not seen, and counts how often the stated intervals hold them.
+//! Estimates the parameters of held-out recipes, and counts how often the intervals contain the true values.
 //!
 //! `cargo run --release -p papsynth-match --example recover -- [RECIPES] [TRIALS] [WINDOWS] [FOLDER] [SEED]`
 //!
-//! The table of simulated recipes is shared by all trials: they are of one size, one preset and fused alike. What was
-//! simulated is kept in FOLDER, line by line, and used again: what was broken off goes on.
+//! All trials share the table of simulated recipes, with one size, one preset and fused images. Simulated rows are
+//! saved in FOLDER, line by line, so an interrupted run continues.
 
-#![expect(clippy::print_stdout, reason = "it is a program")]
+#![expect(clippy::print_stdout, reason = "a program prints")]
 
 use std::error::Error;
 use std::fs::{File, OpenOptions};
@@ -27,20 +27,20 @@ use serde::{Deserialize, Serialize};
 
 const PIXEL_UM: f64 = 0.33;
 
-/// Of the recipes of the trials. Nothing was chosen by looking at these.
+/// Seed of the recipes of the trials. No choice depended on them.
 const SEED: u64 = 20_261_123;
 
-/// Of the table.
+/// Seed of the table.
 const TABLE_SEED: u64 = 1;
 
-/// A recipe that was simulated, or why it was not.
+/// A simulated recipe, or an error.
 #[derive(Serialize, Deserialize)]
 struct Row {
     row: usize,
     made: Result<Made, String>,
 }
 
-/// What was seen of a recipe.
+/// Results of a recipe.
 #[derive(Serialize, Deserialize)]
 struct Made {
     places: Vec<f64>,
@@ -78,11 +78,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         seek_pixel: false,
         field_sd: FieldSd::default(),
     };
-    // What is measured is known when the table is made: it stays as it is in the table, and differs in trials of its own.
+    // Measured parameters are constant in the table, and vary in separate trials.
     let mut known = setting.base_values();
-    for (parameter, value) in
-        [(Parameter::Noise, 2.2), (Parameter::Pattern, 0.01), (Parameter::Across, 0.24), (Parameter::Down, 0.41)]
-    {
+    for (parameter, value) in [
+        (Parameter::Noise, 2.2),
+        (Parameter::Pattern, 0.01),
+        (Parameter::NoiseCorrelationX, 0.24),
+        (Parameter::NoiseCorrelationY, 0.41),
+    ] {
         known.set(parameter, value);
     }
     let model = Model::builtin();
@@ -90,48 +93,48 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let params = TableParams { recipes, windows, seed: TABLE_SEED };
     let plan = Plan::new(&setting, &known, &view, &make, &params)?;
-    let table = kept(&folder.join(format!("table-{recipes}-{windows}.jsonl")), recipes, |row| {
+    let table = saved(&folder.join(format!("table-{recipes}-{windows}.jsonl")), recipes, |row| {
         let (places, summary) = plan.row(row).map_err(|e| e.to_string())?;
         Ok(Made::new(&places, summary, Vec::new()))
     })?;
     let (rows, places): (Vec<Vec<f64>>, Vec<Vec<f64>>) =
         table.iter().map(|made| (made.statistics(), made.places.clone())).unzip();
     let regression = Regression::new(&rows, &places);
-    println!("part of the variance that unseen recipes of the table were told:");
+    println!("explained fraction of the variance, on held-out recipes of the table:");
     for (parameter, part) in plan.sought().iter().zip(regression.explained()) {
         println!("    {:<24} {part:.3}", parameter.name());
     }
 
-    let bench = Bench { view: &view, setting: &setting, make: &make, windows, seed };
+    let trials_of = Trials { view: &view, setting: &setting, make: &make, windows, seed };
     let drawn = unseen(trials, seed);
     let file = |what: &str| folder.join(format!("{what}-{seed}-{windows}.jsonl"));
-    let tried = kept(&file("trials"), trials, |row| {
+    let tried = saved(&file("trials"), trials, |row| {
         let mut values = known.clone();
         plan.sought().iter().for_each(|p| values.set(*p, p.prior().value(drawn[row][p.index()])));
-        bench.run(row, &drawn[row], &values)
+        trials_of.run(row, &drawn[row], &values)
     })?;
-    let lit = kept(&file("lights"), trials, |row| bench.run(row, &drawn[row], &Values::at(&drawn[row])))?;
+    let lit = saved(&file("lights"), trials, |row| trials_of.run(row, &drawn[row], &Values::at(&drawn[row])))?;
 
     let estimates: Vec<Vec<Estimate>> = tried.iter().map(|t| regression.estimate(&t.statistics())).collect();
     let mut tally = Tally::default();
-    println!("| parameter | explained | claimed | covered | median width |\n|---|---|---|---|---|");
+    println!("| parameter | explained | identified | covered | median width |\n|---|---|---|---|---|");
     for parameter in PARAMETERS.into_iter().filter(|p| p.prior().source == Source::Measured) {
         let found = |t: &Made| t.measured.iter().find(|(p, _)| *p == parameter).map(|(_, e)| in_range(parameter, e));
         let pairs = lit.iter().filter_map(|t| found(t).map(|e| (t.places[parameter.index()], e)));
         tally.add(parameter, None, &pairs.collect::<Vec<_>>(), trials);
     }
-    tally.tell("measured");
+    tally.print("measured");
     for (i, parameter) in plan.sought().iter().enumerate() {
         let pairs = tried.iter().zip(&estimates).map(|(t, e)| (t.places[parameter.index()], e[i]));
         tally.add(*parameter, Some(regression.explained()[i]), &pairs.collect::<Vec<_>>(), trials);
     }
-    tally.tell("all");
+    tally.print("all");
     tally.draw(&folder.join("recovered.png"))?;
     Ok(())
 }
 
-/// Where trials are made.
-struct Bench<'a> {
+/// Settings of the trials.
+struct Trials<'a> {
     view: &'a WindowSampler,
     setting: &'a Setting,
     make: &'a MakeEngine<'a>,
@@ -139,7 +142,7 @@ struct Bench<'a> {
     seed: u64,
 }
 
-impl Bench<'_> {
+impl Trials<'_> {
     fn run(&self, row: usize, places: &[f64], values: &Values) -> Result<Made, String> {
         let engine = (self.make)(&recipe(self.setting, values, |_| true)).map_err(|e| e.to_string())?;
         let key = |k: usize| Key { seed: self.seed, index: (row * self.windows + k) as u64 };
@@ -158,10 +161,10 @@ fn in_range(parameter: Parameter, e: &Estimate) -> Estimate {
     Estimate { value, low, high }
 }
 
-/// What is claimed, and how much of it is true.
+/// Counts of identified parameters and of their coverage.
 #[derive(Default)]
 struct Tally {
-    claimed: Vec<(f64, Estimate)>,
+    identified: Vec<(f64, Estimate)>,
     never: Vec<String>,
     panels: Vec<Vec<(f64, Estimate)>>,
 }
@@ -171,38 +174,39 @@ fn holds((t, e): &(f64, Estimate)) -> bool {
 }
 
 impl Tally {
-    /// True places and estimates of a parameter.
+    /// Adds the true positions and the estimates of a parameter.
     fn add(&mut self, parameter: Parameter, explained: Option<f64>, found: &[(f64, Estimate)], trials: usize) {
-        let claimed: Vec<(f64, Estimate)> = found.iter().filter(|(_, e)| e.high - e.low <= WIDEST).copied().collect();
-        let inside = claimed.iter().filter(|p| holds(p)).count();
+        let identified: Vec<(f64, Estimate)> =
+            found.iter().filter(|(_, e)| e.high - e.low <= WIDEST).copied().collect();
+        let inside = identified.iter().filter(|p| holds(p)).count();
         let explained = explained.map_or(String::from("measured"), |e| format!("{:.0} %", 100.0 * e));
         println!(
             "| {} | {explained} | {}/{trials} | {inside} | {:.2} |",
             parameter.name(),
-            claimed.len(),
-            median(claimed.iter().map(|(_, e)| e.high - e.low).collect())
+            identified.len(),
+            median(identified.iter().map(|(_, e)| e.high - e.low).collect())
         );
-        if claimed.is_empty() {
+        if identified.is_empty() {
             self.never.push(parameter.name());
         } else {
-            self.panels.push(claimed.clone());
+            self.panels.push(identified.clone());
         }
-        self.claimed.extend(claimed);
+        self.identified.extend(identified);
     }
 
-    fn tell(&self, what: &str) {
-        let covered = self.claimed.iter().filter(|p| holds(p)).count();
-        let widths = self.claimed.iter().map(|(_, e)| e.high - e.low).collect();
+    fn print(&self, what: &str) {
+        let covered = self.identified.iter().filter(|p| holds(p)).count();
+        let widths = self.identified.iter().map(|(_, e)| e.high - e.low).collect();
         println!(
-            "{what}: {} pairs claimed, {covered} ({:.1} %) covered, median width {:.3} of the range; never claimed: {}",
-            self.claimed.len(),
-            100.0 * covered as f64 / self.claimed.len() as f64,
+            "{what}: {} pairs identified, {covered} ({:.1} %) covered, median width {:.3} of the range; never identified: {}",
+            self.identified.len(),
+            100.0 * covered as f64 / self.identified.len() as f64,
             median(widths),
             self.never.join(", ")
         );
     }
 
-    /// A panel a parameter that was claimed: the truth to the right, what was found upwards, intervals as lines.
+    /// Draws one panel per identified parameter: true value horizontally, estimate vertically, intervals as lines.
     fn draw(&self, path: &Path) -> Result<(), Box<dyn Error>> {
         const PANEL: usize = 110;
         const SIDE: usize = 96;
@@ -245,8 +249,8 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-/// Rows that were made before are read, the others made and added to the file as they are done.
-fn kept(
+/// Reads saved rows, and computes and saves the missing ones.
+fn saved(
     path: &Path,
     count: usize,
     make: impl Fn(usize) -> Result<Made, String> + Sync,
@@ -254,7 +258,7 @@ fn kept(
     let mut rows: Vec<Option<Row>> = (0..count).map(|_| None).collect();
     if path.exists() {
         for line in BufReader::new(File::open(path)?).lines() {
-            // A line that was broken off is made again.
+            // An incomplete line is computed again.
             if let Ok(row) = serde_json::from_str::<Row>(&line?)
                 && row.row < count
             {
@@ -277,8 +281,8 @@ fn kept(
     let all = rows.into_iter().flatten().chain(made);
     let mut all: Vec<Row> = all.collect();
     all.sort_by_key(|row| row.row);
-    let made = all.into_iter().filter_map(|row| row.made.map_err(|e| (left_out += 1, println!("left out: {e}"))).ok());
+    let made = all.into_iter().filter_map(|row| row.made.map_err(|e| (left_out += 1, println!("failed: {e}"))).ok());
     let made = made.collect();
-    println!("{}: {count} rows, {left_out} left out", path.display());
+    println!("{}: {count} rows, {left_out} failed", path.display());
     Ok(made)
 }

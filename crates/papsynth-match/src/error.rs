@@ -28,12 +28,12 @@ pub enum Error {
         pixel_um: f64,
     },
     /// Too many simulated recipes failed.
-    #[error("only {made} of {asked} recipes could be simulated: {reason}")]
-    SimulationTable {
+    #[error("only {succeeded} of {total} recipes could be simulated: {reason}")]
+    Simulation {
         /// Recipes that could be simulated.
-        made: usize,
+        succeeded: usize,
         /// All recipes.
-        asked: usize,
+        total: usize,
         /// Error of the last failed recipe.
         reason: String,
     },

@@ -1,4 +1,4 @@
-//! The whole way: measure, simulate, regress, search.
+//! The complete match: measurement, simulation, regression, search.
 
 use papsynth::recipe::{self, Recipe};
 use papsynth_judge::{Control, FieldImage, Phase};
@@ -15,13 +15,14 @@ use crate::summary::{Summary, Window};
 use crate::table::{Plan, SIMULATING, TableParams};
 use crate::view::{MakeEngine, WindowSampler};
 
-/// Whether the size of a pixel is known.
+/// Pixel size.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PixelSize {
-    /// It is known, µm.
+    /// A known pixel size, µm.
     Known(f64),
-    /// It is sought, about this, µm: cells are taken to be as large as the recipe to begin with says.
+    /// An unknown pixel size with an initial value, µm. The match estimates it, and assumes the cell size of the
+    /// initial recipe.
     Sought(f64),
 }
 
@@ -33,10 +34,10 @@ impl PixelSize {
     }
 }
 
-/// How a microscope is matched.
+/// Parameters of a match.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatchParams {
-    /// Size of a pixel. Default: known, 0.33 µm.
+    /// Pixel size. Default: known, 0.33 µm.
     pub pixel: PixelSize,
     /// Windows to simulate before the search, 60 to 1000000. Default 2000.
     pub simulations: usize,
@@ -62,43 +63,43 @@ impl Default for MatchParams {
     }
 }
 
-/// Where a number of the recipe comes from.
+/// Origin of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Origin {
-    /// A statistic of the real fields says it.
+    /// A statistic of the real fields.
     Measured,
-    /// Simulated windows with it are like the real ones.
+    /// Simulations: windows with this value are similar to the real ones.
     Simulated,
-    /// The fields do not tell: the value is that of the recipe to begin with.
+    /// The initial recipe, because the fields do not determine the value.
     NotIdentified,
 }
 
-/// What was found of a parameter.
+/// Result for a parameter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ParameterFit {
-    /// Which.
+    /// Parameter.
     pub parameter: Parameter,
-    /// Its fields in the recipe.
+    /// Fields of the recipe.
     pub path: &'static str,
-    /// Its unit.
+    /// Unit.
     pub unit: &'static str,
-    /// Where the value comes from.
+    /// Origin of the value.
     pub origin: Origin,
-    /// What the recipe now says.
+    /// Value in the matched recipe.
     pub value: f64,
-    /// The 95 % interval.
+    /// 95 % interval.
     pub interval: [f64; 2],
-    /// What the recipe to begin with says.
+    /// Value in the initial recipe.
     pub before: f64,
-    /// The range that was searched.
+    /// Range of the search.
     pub range: [f64; 2],
-    /// Width of the interval over that of the range, in steps or factors as the parameter counts.
+    /// Width of the interval over that of the range, on the scale of the parameter.
     pub width: f64,
 }
 
 impl ParameterFit {
-    /// A value of which nothing more is known than its range.
+    /// Returns a value whose interval is the complete range.
     pub(crate) fn new(parameter: Parameter, origin: Origin, value: f64) -> Self {
         let Prior { path, unit, low, high, .. } = parameter.prior();
         let range = [low, high];
@@ -106,57 +107,58 @@ impl ParameterFit {
     }
 }
 
-/// Root mean square of standard errors between simulated and real windows. Two sets of windows of one recipe are some 1.4 apart.
+/// Root mean square of the differences between simulated and real statistics, in standard errors. For two sets of
+/// windows of one recipe it is about 1.4.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Distance {
-    /// Of the recipe to begin with.
+    /// For the initial recipe.
     pub before: f64,
-    /// Of what was measured and regressed.
+    /// For the values from measurement and regression.
     pub estimated: f64,
     /// After the search.
     pub after: f64,
 }
 
-/// A statistic of the real windows and of simulated ones.
+/// A statistic of the real and of the simulated windows.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Statistic {
-    /// What it is.
+    /// Name.
     pub name: String,
-    /// Of the real windows.
+    /// For the real windows.
     pub real: f64,
-    /// Of the recipe to begin with.
+    /// For the initial recipe.
     pub before: f64,
-    /// Of the recipe that was found.
+    /// For the matched recipe.
     pub after: f64,
-    /// How many standard errors that is off.
-    pub apart: f64,
+    /// Difference between matched recipe and real windows, in standard errors.
+    pub standard_errors: f64,
 }
 
-/// What was found.
+/// Result of a match.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Fit {
-    /// The recipe for fields like the real ones.
+    /// Matched recipe.
     #[serde(skip)]
     pub recipe: Recipe,
-    /// Every parameter.
+    /// All parameters.
     pub parameters: Vec<ParameterFit>,
-    /// How near it comes.
+    /// Distance between simulated and real windows.
     pub distance: Distance,
-    /// Every statistic.
+    /// All statistics.
     pub statistics: Vec<Statistic>,
-    /// Real fields.
+    /// Number of real fields.
     pub fields: usize,
-    /// Windows that they were cut into.
+    /// Number of windows in the real fields.
     pub windows: usize,
-    /// Nuclei in these.
+    /// Number of nuclei in the windows.
     pub nuclei: usize,
-    /// Recipes of the table.
+    /// Number of simulated recipes.
     pub simulated: usize,
-    /// Whether the pictures were fused of several planes.
+    /// Whether the real fields are fused from several focal planes (extended depth of field).
     pub extended: bool,
 }
 
-/// Matches microscopes.
+/// A match of a recipe to real fields.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Match {
     params: MatchParams,
@@ -169,15 +171,15 @@ const LEAST_RECIPES: usize = 30;
 /// Minimum number of nuclei to estimate stain and sizes.
 const LEAST_NUCLEI: usize = 8;
 
-/// Seeds of the search and of the last comparison, apart from that of the table.
+/// Differences between the seed of the table and those of the search and of the final comparison.
 const SEARCH: u64 = 1 << 40;
 const LAST: u64 = 1 << 41;
 
 impl Match {
-    /// Begins with a recipe.
+    /// Checks the parameters. `base` is the initial recipe.
     ///
     /// # Errors
-    /// If a parameter is out of its range.
+    /// If a parameter is out of range.
     pub fn new(params: &MatchParams, base: &Recipe) -> Result<Self, Error> {
         papsynth_judge::Error::check(&[
             ("simulations", params.simulations as f64, [60.0, 1e6], "60 to 1000000"),
@@ -188,9 +190,9 @@ impl Match {
         Ok(Self { params: params.clone(), base: base.clone() })
     }
 
-    /// The setting of fields and what is known beforehand of their values.
+    /// Returns the setting for real fields, and the known parameter values.
     fn setting(&self, measured: &Measured) -> (Setting, Values) {
-        // Pictures of extended focus have more than their noise in common.
+        // Fused images differ from others by more than their noise.
         let fused = measured.extended && self.base.focus.output == recipe::FocusOutput::Planes;
         let setting = Setting {
             base: if fused { self.base.clone().fused() } else { self.base.clone() },
@@ -210,13 +212,14 @@ impl Match {
 
     /// Finds the recipe of real fields. The result does not depend on the number of threads.
     ///
-    /// The phases of the progress reports are "measuring fields", "measuring windows", "simulating fields", "fitting regressions"
-    /// and "searching, distance …". The last one continues the count of "simulating fields", so the time of the first simulations
-    /// gives the remaining time of the complete match, except for the seconds of "fitting regressions".
+    /// The phases of the progress reports are "measuring fields", "measuring windows", "simulating fields", "fitting
+    /// regressions" and "searching, distance …". The last one continues the count of "simulating fields", so the time
+    /// of the first simulations gives the remaining time of the complete match, except for the seconds of "fitting
+    /// regressions".
     ///
     /// # Errors
-    /// If there are no fields, or too few nuclei in them, or recipes cannot be simulated; [`Error::Stopped`] if the stop flag is
-    /// set.
+    /// If there are no fields, or too few nuclei in them, or recipes cannot be simulated; [`Error::Stopped`] if the
+    /// stop flag is set.
     pub fn run(&self, fields: &[FieldImage], make: &MakeEngine<'_>, control: &Control) -> Result<Fit, Error> {
         let measured = measure_with(fields, self.params.pixel.um(), control)?;
         let view = WindowSampler::new(measured.size_px, self.params.pixel.um(), measured.nuclei_from)?;
@@ -259,7 +262,7 @@ impl Match {
     }
 }
 
-/// The search about an estimate.
+/// The search around the estimates.
 struct Search<'a> {
     plan: &'a Plan<'a>,
     measured: &'a Measured,
@@ -270,7 +273,7 @@ struct Search<'a> {
     total: usize,
 }
 
-/// Places of all sought parameters, how near they come, and every statistic.
+/// Positions of all sought parameters, distance, and all statistics.
 type Found = (Vec<f64>, Distance, Vec<Statistic>);
 
 impl Search<'_> {
@@ -313,7 +316,7 @@ impl Search<'_> {
         let all = sought.iter().zip(self.estimates.iter().copied());
         let moving: Vec<(usize, Estimate)> =
             all.clone().enumerate().filter(|(_, (p, _))| fitted(**p)).map(|(i, (_, e))| (i, e)).collect();
-        // What is not identified stays where the recipe to begin with has it.
+        // Parameters that are not identified keep the value of the initial recipe.
         let start: Vec<f64> = all
             .map(|(p, e)| if fitted(*p) { e.value } else { p.prior().place(base.get(*p)).clamp(0.0, 1.0) })
             .collect();
@@ -325,7 +328,7 @@ impl Search<'_> {
         let mut towards: Option<Vec<f64>> = None;
         for _ in 0..rounds {
             let next = match &towards {
-                // A step that led away is halved.
+                // A step that increased the distance is halved.
                 Some(failed) => failed.iter().zip(&best.0).map(|(a, b)| 0.5 * (a + b)).collect(),
                 None => propose(&self.forward, [&real.values, &best.2.values], &best.0, &moving),
             };
@@ -341,22 +344,22 @@ impl Search<'_> {
                 towards = Some(next);
             }
         }
-        // The last comparison is on windows that the search has not seen.
+        // The final comparison uses windows that the search did not use.
         let name = format!("searching, distance {:.2}", best.1);
         let phase = self.control.resume(&name, done, self.total);
         let before = self.simulate(&start, |_| false, seed ^ LAST, &phase)?;
         let estimated = distance(&apart(&self.simulate(&start, fitted, seed ^ LAST, &phase)?));
         let after = self.simulate(&best.0, fitted, seed ^ LAST, &phase)?;
         let off = apart(&after);
-        let told = Distance { before: distance(&apart(&before)), estimated, after: distance(&off) };
+        let distances = Distance { before: distance(&apart(&before)), estimated, after: distance(&off) };
         let statistic = |i: usize| Statistic {
             name: real.names[i].clone(),
             real: real.values[i],
             before: before.values[i],
             after: after.values[i],
-            apart: off[i],
+            standard_errors: off[i],
         };
-        Ok((best.0, told, (0..real.names.len()).map(statistic).collect()))
+        Ok((best.0, distances, (0..real.names.len()).map(statistic).collect()))
     }
 
     fn parameters(&self, places: &[f64]) -> Vec<ParameterFit> {
@@ -386,7 +389,7 @@ impl Search<'_> {
     }
 }
 
-/// Width of an interval of values over that of the range.
+/// Returns the width of an interval of values over that of the range.
 fn width_of_value(parameter: Parameter, e: &Estimate) -> f64 {
     let prior = parameter.prior();
     prior.place(e.high) - prior.place(e.low)

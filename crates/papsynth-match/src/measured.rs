@@ -1,4 +1,4 @@
-//! What a statistic of real fields says by itself: light, noise, bits.
+//! Parameters that statistics of real fields measure directly: light, noise, bits.
 
 use papsynth_judge::{Control, FieldImage, NucleiFrom};
 use rayon::prelude::*;
@@ -11,56 +11,57 @@ use crate::regression::{Estimate, min_max};
 use crate::view::WindowSampler;
 use portable_numerics::statistics::{deviation, mean, quantile};
 
-/// A slide darker than this, of 255, is none.
+/// Minimum grey level of an empty slide, of 255.
 const DARK: f64 = 20.0;
 
-/// Neighbours that share more noise than this were fused.
+/// Images with a higher correlation of noise are fused from several planes.
 const FUSED: f64 = 0.06;
 
-/// Mean of x² over the grid that the judge takes the mean of a background on.
+/// Mean of x² over the grid for the mean of the background in papsynth-judge.
 const MEAN_SQUARE: f64 = 0.3667;
 
-/// What no statistic knows better than: dirt and unevenness of the slide add to noise, a part of it.
+/// Systematic error of noise, relative: dirt and texture of the slide add to it.
 const NOISE_ERROR: f64 = 0.02;
 
-/// To the part of noise that is a pattern, a part of it.
+/// Systematic error of the pattern noise, relative.
 const PATTERN_ERROR: f64 = 0.06;
 
-/// To a correlation.
+/// Systematic error of a correlation.
 const CORRELATION_ERROR: f64 = 0.012;
 
-/// Variance that rounding and what lies on the slide add to noise, squares of levels of 8 bits.
+/// Variance that rounding and dirt add to noise, squared grey levels of 255.
 const ADDED: f64 = 0.06;
 
-/// To a correlation, over the added part of the variance: rounding shares nothing, and dirt shares all.
-const ADDED_SHARE: f64 = 2.0;
+/// Systematic error of a correlation, relative to the added fraction of the variance: rounding is uncorrelated, and
+/// dirt is correlated.
+const ADDED_CORRELATION: f64 = 2.0;
 
-/// To the level, a part of full scale; and where all is covered, and what is taken for empty is not.
+/// Systematic error of the level, fraction of full scale; the second one for a field without empty slide.
 const LEVEL_ERROR: f64 = 0.003;
 const COVERED_ERROR: f64 = 0.025;
 
-/// To a curvature.
-const BOWL_ERROR: f64 = 0.003;
+/// Systematic error of a curvature.
+const FALLOFF_ERROR: f64 = 0.003;
 
-/// What real fields say of light and noise.
+/// Light and noise of real fields.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
-    /// Columns and rows of a field.
+    /// Width and height of a field.
     pub size_px: [usize; 2],
-    /// Bits of a grey level.
+    /// Bits per pixel.
     pub bits: u32,
-    /// Whether neighbouring pixels share noise: the pictures were fused.
+    /// Whether noise is correlated between pixels: the images are fused from several planes.
     pub extended: bool,
-    /// How the nuclei of all fields are known.
+    /// Source of the nuclei.
     pub nuclei_from: NucleiFrom,
-    /// Parameters with their 95 % intervals; not here is what could not be told.
+    /// Measured parameters with 95 % intervals.
     pub estimates: Vec<(Parameter, Estimate)>,
     /// Standard deviations between fields.
     pub field_sd: FieldSd,
 }
 
 impl Measured {
-    /// The estimate of a parameter, if there is one.
+    /// Returns the estimate of a parameter, if there is one.
     #[must_use]
     pub fn get(&self, parameter: Parameter) -> Option<Estimate> {
         self.estimates.iter().find(|(p, _)| *p == parameter).map(|(_, e)| *e)
@@ -76,10 +77,10 @@ struct Light {
     empty: Empty,
 }
 
-/// Measures what a statistic determines by itself. `pixel_um` is the size of a pixel as far as it is known.
+/// Measures light, noise and bits. `pixel_um` is the approximate pixel size.
 ///
 /// # Errors
-/// If there is no field, one is black, or they are of different sizes.
+/// If there is no field, a field is black, or the sizes differ.
 pub fn measure(fields: &[FieldImage], pixel_um: f64) -> Result<Measured, Error> {
     measure_with(fields, pixel_um, &Control::NONE)
 }
@@ -96,7 +97,7 @@ pub fn measure_with(fields: &[FieldImage], pixel_um: f64, control: &Control) -> 
         let (width, height, [of_first, down]) = (field.width, field.height(), size_px);
         if [width, height] != size_px {
             return refuse(format!(
-                "is {width} x {height} pixels, the first is {of_first} x {down}; one microscope takes fields of one size"
+                "is {width} x {height} pixels; expected {of_first} x {down}, the size of the first field"
             ));
         }
         let mut some: Vec<f64> =
@@ -104,11 +105,11 @@ pub fn measure_with(fields: &[FieldImage], pixel_um: f64, control: &Control) -> 
         let level = quantile(&mut some, 0.98);
         if level.is_nan() || level < DARK {
             return refuse(format!(
-                "is black: its brightest pixels are at {level:.1} of 255, and an empty slide is expected to be brighter than {DARK:.0}"
+                "is black: percentile 98 is {level:.1} of 255; expected {DARK:.0} or more, the light of an empty slide"
             ));
         }
     }
-    // Points are of those nuclei that somebody took an interest in: simulated windows know all of theirs.
+    // Annotated points are often incomplete, while simulated windows have all nuclei.
     let masks = fields.iter().all(|field| NucleiFrom::of(&field.nuclei) == NucleiFrom::Masks);
     let nuclei_from = if masks { NucleiFrom::Masks } else { NucleiFrom::Search };
     let view = WindowSampler::new(size_px, pixel_um, nuclei_from)?;
@@ -122,15 +123,16 @@ pub fn measure_with(fields: &[FieldImage], pixel_um: f64, control: &Control) -> 
     let lights: Vec<Result<Light, Error>> = fields.par_iter().map(one).collect();
     let lights: Vec<Light> = lights.into_iter().collect::<Result<_, _>>()?;
     let column = |f: &dyn Fn(&Light) -> f64| -> Vec<f64> { lights.iter().map(f).filter(|v| v.is_finite()).collect() };
-    let shared = [0, 1].map(|i| column(&|l| l.empty.shared[i]));
-    let extended = shared.iter().all(|s| !s.is_empty()) && shared.iter().map(|s| mean(s)).fold(0.0, f64::max) > FUSED;
+    let correlations = [0, 1].map(|i| column(&|l| l.empty.correlation[i]));
+    let extended =
+        correlations.iter().all(|s| !s.is_empty()) && correlations.iter().map(|s| mean(s)).fold(0.0, f64::max) > FUSED;
 
     let mut estimates = Vec::new();
     let levels = column(&|l| l.level);
     let mut put = |parameter: Parameter, values: &[f64], floor: f64| {
         if !values.is_empty() {
             let (middle, half) = (mean(values), of_mean(deviation(values), values.len()));
-            // One field says nothing of others: the interval is as wide as the range.
+            // One field does not determine the variation: the interval is the complete range.
             let half = if half.is_finite() { half + floor } else { f64::INFINITY };
             let prior = parameter.prior();
             let [low, high] = [middle - half, middle + half].map(|v| v.clamp(prior.low, prior.high));
@@ -140,15 +142,17 @@ pub fn measure_with(fields: &[FieldImage], pixel_um: f64, control: &Control) -> 
     let covered = mean(&column(&|l| l.coverage));
     let level_error = LEVEL_ERROR + COVERED_ERROR * covered * covered;
     put(Parameter::Level, &levels, level_error);
-    put(Parameter::BowlAcross, &column(&|l| l.across.max(0.0)), BOWL_ERROR);
-    put(Parameter::BowlDown, &column(&|l| l.down.max(0.0)), BOWL_ERROR);
+    put(Parameter::FalloffX, &column(&|l| l.across.max(0.0)), FALLOFF_ERROR);
+    put(Parameter::FalloffY, &column(&|l| l.down.max(0.0)), FALLOFF_ERROR);
     let variances = column(&|l| l.empty.deviation * l.empty.deviation);
     let added = ADDED * (scale / LEVELS) * (scale / LEVELS) / mean(&variances);
-    // What lies on a slide adds to its noise and changes what is shared: by how much is seen in how fields differ.
+    // Dirt adds noise and changes its correlation. The range over fields estimates by how much.
     if extended {
-        for (parameter, values) in [(Parameter::Across, &shared[0]), (Parameter::Down, &shared[1])] {
+        for (parameter, values) in
+            [(Parameter::NoiseCorrelationX, &correlations[0]), (Parameter::NoiseCorrelationY, &correlations[1])]
+        {
             let [low, high] = min_max(values);
-            put(parameter, values, CORRELATION_ERROR + ADDED_SHARE * added + 0.25 * (high - low));
+            put(parameter, values, CORRELATION_ERROR + ADDED_CORRELATION * added + 0.25 * (high - low));
         }
     }
     let noise: Vec<f64> =
@@ -180,7 +184,7 @@ pub fn measure_with(fields: &[FieldImage], pixel_um: f64, control: &Control) -> 
         let per_noise = squares / mean(&variances);
         let half = (2.0 * error + PATTERN_ERROR * variance.abs()) * per_noise;
         let [value, low, mut high] = [0.0, -half, half].map(|d| (variance * per_noise + d).clamp(0.0, 1.0));
-        // Of the noise of the cleanest field it is a larger part.
+        // Relative to the noise of the cleanest field the pattern is larger.
         high = (high * (mean(&variances) / min_max(&variances)[0] + added)).clamp(value, 1.0);
         estimates.push((Parameter::Pattern, Estimate { value, low, high }));
     }
@@ -188,8 +192,8 @@ pub fn measure_with(fields: &[FieldImage], pixel_um: f64, control: &Control) -> 
     let or_default = |sd: f64, default: f64| if sd.is_finite() { sd } else { default };
     let usual = FieldSd::default();
     let field_sd = FieldSd {
-        across: or_default(sd_across, usual.across),
-        down: or_default(sd_down, usual.down),
+        falloff_x: or_default(sd_across, usual.falloff_x),
+        falloff_y: or_default(sd_down, usual.falloff_y),
         noise: or_default(deviation(&noise), usual.noise),
     };
     Ok(Measured { size_px, bits: bits(fields), extended, nuclei_from, estimates, field_sd })
@@ -210,19 +214,19 @@ fn light(field: &FieldImage, view: &WindowSampler, control: &Control) -> Result<
     })
 }
 
-/// The fewest bits that hold all grey levels; 8 where pictures are fractions.
+/// Returns the bits for all grey levels; 8 if grey levels are fractions.
 fn bits(fields: &[FieldImage]) -> u32 {
     let scale = fields.iter().map(|f| f.full_scale).fold(0.0_f32, f32::max);
     (8..16).find(|bits| f64::from(scale) <= libm::exp2(f64::from(*bits))).unwrap_or(16)
 }
 
-/// The deviate that 97.5 % of a standard normal lie below.
+/// 97.5th percentile of the standard normal distribution.
 const NORMAL: f64 = 1.959_964;
 
-/// The same of Student's t with 1, 2, … degrees of freedom.
+/// 97.5th percentile of Student's t with 1, 2, … degrees of freedom.
 const STUDENT: [f64; 10] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228];
 
-/// Of Student's t: from the table, beyond it by the first terms of Fisher's expansion.
+/// Returns the 97.5th percentile of Student's t, beyond the table from the first terms of Fisher's expansion.
 fn student(freedom: usize) -> f64 {
     match STUDENT.get(freedom.wrapping_sub(1)) {
         Some(t) => *t,
@@ -235,13 +239,13 @@ fn student(freedom: usize) -> f64 {
     }
 }
 
-/// Half the width of the 95 % interval of the mean.
+/// Returns half the width of the 95 % interval of a mean.
 fn of_mean(sd: f64, count: usize) -> f64 {
     student(count.saturating_sub(1)) * sd / (count.max(1) as f64).sqrt()
 }
 
-/// The 95 % interval of a standard deviation that was estimated as 1, from the quantiles of χ² by Wilson and Hilferty
-/// (doi:10.1073/pnas.17.12.684).
+/// Returns the 95 % interval of an estimated standard deviation of 1, from the approximation of χ² by Wilson and
+/// Hilferty (doi:10.1073/pnas.17.12.684).
 fn of_deviation(count: usize) -> [f64; 2] {
     let n = count.saturating_sub(1) as f64;
     if n < 1.0 {
@@ -259,7 +263,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fields_of_one_size_and_pixels_with_a_size_are_asked_for() {
+    fn different_sizes_and_an_invalid_pixel_size_are_errors() {
         let two = [("a", 128), ("b", 96)].map(|(name, width)| {
             let grey = (0..width * 96).map(|i| 200.0 + (i % 3) as f32).collect();
             FieldImage { name: name.to_owned(), grey, width, ..FieldImage::default() }
@@ -270,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn quantiles_are_those_of_tables() {
+    fn quantiles_equal_published_tables() {
         assert!((student(30) - 2.042).abs() < 0.002, "{}", student(30));
         assert!((student(11) - 2.201).abs() < 0.003, "{}", student(11));
         // χ² with 7 degrees of freedom: 1.690 and 16.013.

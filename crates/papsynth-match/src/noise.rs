@@ -1,4 +1,4 @@
-//! Noise beyond that of the empty slide, how uneven light is, and small things: how many there are of each size and darkness.
+//! Noise as a function of darkness, unevenness of the light, and counts of small objects.
 
 use crate::error::Error;
 use papsynth_judge::Control;
@@ -6,23 +6,23 @@ use papsynth_judge::filter::separable;
 use papsynth_judge::number::{single, whole};
 use portable_numerics::statistics::{deviation, mean, quantile};
 
-/// Side of the blocks that noise is compared in, pixels.
+/// Size of the blocks for noise, pixels.
 const BLOCK: usize = 8;
 
-/// Absorbances that blocks are sorted by: empty slide first.
+/// Ranges of absorbance of the blocks; the first one is empty slide.
 const BINS: [[f64; 2]; 4] = [[-0.03, 0.02], [0.05, 0.12], [0.12, 0.25], [0.25, 0.6]];
 
-/// The most even part of the blocks of a bin shows noise, the rest structure.
+/// Quantile of the blocks of a range that measures noise; other blocks contain structure.
 const EVENEST: f64 = 0.15;
 
-/// Fewest blocks of a bin.
+/// Minimum number of blocks of a range.
 const LEAST_BLOCKS: usize = 12;
 
-/// Numbers of [`law`].
-const LAW: usize = BINS.len() - 1;
+/// Number of values of [`noise_by_darkness`].
+const DARK_BINS: usize = BINS.len() - 1;
 
-/// Logarithm of the noise of ever darker places over that of the empty slide; NaN where there are none.
-pub(crate) fn law(grey: &[f32], width: usize, empty: f64) -> [f64; LAW] {
+/// Returns the logarithm of the noise in darker ranges over that of the empty slide; NaN for ranges without blocks.
+pub(crate) fn noise_by_darkness(grey: &[f32], width: usize, empty: f64) -> [f64; DARK_BINS] {
     let mut bins: [Vec<f64>; BINS.len()] = Default::default();
     let height = grey.len() / width;
     for top in (0..height.saturating_sub(BLOCK - 1)).step_by(BLOCK) {
@@ -33,7 +33,7 @@ pub(crate) fn law(grey: &[f32], width: usize, empty: f64) -> [f64; LAW] {
             let Some(bin) = BINS.iter().position(|[from, to]| absorbance >= *from && absorbance < *to) else {
                 continue;
             };
-            // A mask that planes and saddles vanish under (Immerkær, doi:10.1006/cviu.1996.0060).
+            // A kernel that removes planes and saddles (Immerkær, doi:10.1006/cviu.1996.0060).
             let mut energy = 0.0;
             for y in 1..BLOCK - 1 {
                 for x in 1..BLOCK - 1 {
@@ -52,30 +52,31 @@ pub(crate) fn law(grey: &[f32], width: usize, empty: f64) -> [f64; LAW] {
     std::array::from_fn(|i| libm::log(levels[i + 1] / levels[0]))
 }
 
-/// Widths of the Gaussians between which the light's unevenness is looked for, pixels.
+/// Standard deviations of the Gaussians of the band in which unevenness is measured, pixels.
 const UNEVEN_PX: [f64; 2] = [6.0, 24.0];
 
-/// Empty slide is within this absorbance after the wider of them.
+/// Maximum absorbance of empty slide after the wider Gaussian.
 const EVEN: f32 = 0.012;
 
-/// Side of the blocks between which it is looked for coarsely, pixels; what of a block is paler than so many of its pixels is slide,
-/// if it is within this part of the light.
+/// Size of the blocks for coarse unevenness, pixels; the quantile of a block that measures the slide; and its maximum
+/// deviation from the light, relative.
 const BLOCK_PX: usize = 32;
 const PALE: f64 = 0.75;
 const SLIDE: f64 = 0.04;
 
-/// Logarithm of the unevenness of empty slide between two scales, and about a quadratic surface; NaN where nothing is empty.
+/// Returns the logarithm of the unevenness of empty slide in a band, and around a quadratic surface; NaN without empty
+/// slide.
 pub(crate) fn unevenness(grey: &[f32], width: usize, empty: f64) -> [f64; 2] {
     let light: Vec<f32> = grey.iter().map(|g| g / single(empty)).collect();
     let [fine, coarse] = UNEVEN_PX.map(|sigma| blur(&light, width, sigma));
-    // Whatever lies there is darker than the slide: the paler half is the slide.
+    // Objects are darker than the slide, so the brighter half is the slide.
     let slide = fine.iter().zip(&coarse).filter(|(_, c)| **c > 1.0 - 2.0 * EVEN);
     let mut rests: Vec<f64> = slide.map(|(f, c)| f64::from((f - c).abs())).collect();
     let finely = if rests.len() < grey.len() / 50 { f64::NAN } else { quantile(&mut rests, 0.5) };
     [finely, coarsely(&fine, width)].map(|v| if v.is_nan() { v } else { libm::log(v.max(1e-6)) })
 }
 
-/// Three quarters of the distance between quartiles of pale places about their quadratic surface.
+/// Returns a robust standard deviation of bright blocks around their quadratic surface.
 fn coarsely(light: &[f32], width: usize) -> f64 {
     let height = light.len() / width;
     let mut places = Vec::new();
@@ -83,7 +84,7 @@ fn coarsely(light: &[f32], width: usize) -> f64 {
         for left in (0..width).step_by(BLOCK_PX) {
             let rows = top..(top + BLOCK_PX).min(height);
             let row = |y: usize| &light[y * width + left..y * width + (left + BLOCK_PX).min(width)];
-            // Every fourth pixel: the light is blurred.
+            // Every fourth pixel suffices, because the light is blurred.
             let mut block: Vec<f64> =
                 rows.step_by(4).flat_map(|y| row(y).iter().step_by(4).map(|v| f64::from(*v))).collect();
             let pale = quantile(&mut block, PALE);
@@ -93,7 +94,7 @@ fn coarsely(light: &[f32], width: usize) -> f64 {
             }
         }
     }
-    /// Fewer blocks say nothing beyond their surface.
+    /// Minimum number of blocks.
     const LEAST_PLACES: usize = 24;
     if places.len() < LEAST_PLACES {
         return f64::NAN;
@@ -105,22 +106,22 @@ fn coarsely(light: &[f32], width: usize) -> f64 {
     0.741 * (quantile(&mut rests, 0.75) - quantile(&mut rests, 0.25))
 }
 
-/// Width of the Gaussian whose remainder is noise, pixels.
+/// Standard deviation of the Gaussian that is subtracted to obtain noise, pixels.
 const NOISE_PX: f64 = 6.0;
 
-/// Of that whose difference from a wider one shows that something lies there.
-const THINGS_PX: f64 = 2.5;
+/// Standard deviation of the Gaussian that detects objects, pixels.
+const OBJECTS_PX: f64 = 2.5;
 
-/// How many times its usual size that difference may have where nothing lies.
-const USUAL: f64 = 3.0;
+/// Maximum signal of empty slide in the detection of objects, relative to its typical size.
+const OBJECT_FACTOR: f64 = 3.0;
 
-/// Empty slide is within this part of its light.
+/// Maximum relative deviation of empty slide from its light.
 const NEAR: f32 = 0.04;
 
-/// Fewest pixels of empty slide that noise is measured on.
+/// Minimum number of pixels of empty slide for noise.
 const LEAST_EMPTY: usize = 4000;
 
-/// Mean product of pixels that are known in both; NaN of fewer than so many.
+/// Returns the mean product of pixels that are known in both images; NaN for fewer than `least`.
 fn mean_product(a: &[f32], b: &[f32], least: usize) -> f64 {
     let (mut sum, mut count) = (0.0, 0_usize);
     for (a, b) in a.iter().zip(b) {
@@ -133,55 +134,56 @@ fn mean_product(a: &[f32], b: &[f32], least: usize) -> f64 {
     if count < least { f64::NAN } else { sum / count as f64 }
 }
 
-/// Noise of the empty parts of a field.
+/// Noise of the empty slide of a field.
 pub(crate) struct Empty {
-    /// Over the light there; NaN elsewhere.
+    /// Noise over the light; NaN outside the empty slide.
     pub(crate) relative: Vec<f32>,
-    /// Its standard deviation, in the levels of the picture; NaN where too little is empty.
+    /// Standard deviation, grey levels of the image; NaN for too little empty slide.
     pub(crate) deviation: f64,
-    /// What it shares with the next pixel of the row and of the column.
-    pub(crate) shared: [f64; 2],
+    /// Correlation with the next pixel of the row and of the column.
+    pub(crate) correlation: [f64; 2],
 }
 
-/// What a Gaussian takes of the covariance of noise when it is taken off: this part of the sum over all distances. A
-/// remainder g − G∗g has the covariance γ − (2G − G∗G)∗γ, and noise is narrow beside G.
-const TAKEN: f64 = 3.0 / (4.0 * std::f64::consts::PI * NOISE_PX * NOISE_PX);
+/// Reduction of the covariance of noise by subtraction of a Gaussian, relative to the sum over all distances. The
+/// remainder g − G∗g has the covariance γ − (2G − G∗G)∗γ, and the correlation length of noise is short compared with G.
+const SUBTRACTED: f64 = 3.0 / (4.0 * std::f64::consts::PI * NOISE_PX * NOISE_PX);
 
 impl Empty {
-    /// Of a picture whose empty slide is at a level.
+    /// Measures an image with this grey level of the empty slide.
     pub(crate) fn new(grey: &[f32], width: usize, level: f64) -> Self {
         let wide = blur(grey, width, NOISE_PX);
-        let things: Vec<f32> = blur(grey, width, THINGS_PX).iter().zip(&wide).map(|(a, b)| a - b).collect();
+        let things: Vec<f32> = blur(grey, width, OBJECTS_PX).iter().zip(&wide).map(|(a, b)| a - b).collect();
         let slide = single((1.0 - f64::from(NEAR)) * level);
         let mut sizes: Vec<f64> =
             things.iter().zip(&wide).filter(|(_, w)| **w > slide).map(|(t, _)| f64::from(t.abs())).collect();
-        // The median size of a normal is 0.674 of its deviation; what lies there makes it larger, by little.
-        let most = single(USUAL * quantile(&mut sizes, 0.4).max(1e-6) / 0.524);
+        // The quantile 0.4 of the absolute value of a normal number is 0.524 standard deviations.
+        let most = single(OBJECT_FACTOR * quantile(&mut sizes, 0.4).max(1e-6) / 0.524);
         let known = |(w, t): (&f32, &f32)| *w > slide && t.abs() < most;
         let parts = grey.iter().zip(wide.iter().zip(&things));
         let rest: Vec<f32> = parts.map(|(g, at)| if known(at) { g - at.0 } else { f32::NAN }).collect();
         let relative = rest.iter().zip(&wide).map(|(r, w)| r / w).collect();
         let found = [0, 1, width].map(|step| mean_product(&rest, &rest[step..], LEAST_EMPTY));
         let mut own = found;
-        /// Each round leaves a fiftieth of the error of the one before.
+        /// Each round reduces the error by a factor of about 50.
         const ROUNDS: usize = 6;
         for _ in 0..ROUNDS {
             let all = own[0] * (1.0 + 2.0 * own[1] / own[0]) * (1.0 + 2.0 * own[2] / own[0]);
-            own = found.map(|f| f + TAKEN * all);
+            own = found.map(|f| f + SUBTRACTED * all);
         }
-        Self { relative, deviation: own[0].sqrt(), shared: [own[1] / own[0], own[2] / own[0]] }
+        Self { relative, deviation: own[0].sqrt(), correlation: [own[1] / own[0], own[2] / own[0]] }
     }
 
-    /// By what to multiply variances of [`relative`](Self::relative): the Gaussian took a part of them.
+    /// Returns the factor that corrects variances of [`relative`](Self::relative) for the subtracted Gaussian.
     pub(crate) fn restored(&self) -> f64 {
-        1.0 / (1.0 - TAKEN * (1.0 + 2.0 * self.shared[0]) * (1.0 + 2.0 * self.shared[1]))
+        1.0 / (1.0 - SUBTRACTED * (1.0 + 2.0 * self.correlation[0]) * (1.0 + 2.0 * self.correlation[1]))
     }
 }
 
-/// Fewest pixels that two fields have empty in common.
+/// Minimum number of pixels that are empty in both fields.
 const LEAST_PIXELS: usize = 5000;
 
-/// Mean over pairs of fields of the relative variance that they share, with its standard error; none of fields without common slide.
+/// Returns the mean over pairs of fields of their relative covariance, with its standard error; none without common
+/// empty slide.
 pub(crate) fn pattern(fields: &[Vec<f32>], control: &Control) -> Result<Option<[f64; 2]>, Error> {
     let mut products = Vec::new();
     for (i, a) in fields.iter().enumerate() {
@@ -191,30 +193,31 @@ pub(crate) fn pattern(fields: &[Vec<f32>], control: &Control) -> Result<Option<[
         }
     }
     let pairs = products.len();
-    // Pairs share fields: as many are independent as there are fields.
+    // Pairs with a common field are not independent: the number of fields limits the degrees of freedom.
     let sd = if pairs > 1 { deviation(&products) } else { mean(&products).abs() };
     Ok((pairs > 0).then(|| [mean(&products), sd / (fields.len().min(pairs) as f64).sqrt()]))
 }
 
-/// Scales at which small things are sought, pixels.
+/// Scales of small objects, pixels.
 const SCALES: [f64; 3] = [1.0, 2.0, 4.0];
 
-/// Least darkness of small things over their surroundings after a difference of Gaussians, absorbance.
+/// Minimum contrast of small objects after a difference of Gaussians, absorbance.
 const DARKNESS: [f32; 3] = [0.006, 0.02, 0.06];
 
-/// What lies around is empty slide if it is paler, absorbance after a wide Gaussian.
+/// Maximum absorbance of empty surroundings, after a wide Gaussian.
 const EMPTY_AROUND: f32 = 0.025;
 
-/// Width of that Gaussian, pixels.
+/// Standard deviation of the Gaussian of the surroundings, pixels.
 const AROUND_PX: f64 = 10.0;
 
-/// A thing is long if its curvature across is so many times that along.
+/// Minimum ratio of the curvatures of an elongated object.
 const LONG: f32 = 2.5;
 
-/// Least light, a part of that of the empty slide.
+/// Minimum light, relative to the empty slide.
 const LEAST_LIGHT: f32 = 0.004;
 
-/// Logarithms of how many there are a thousand pixels, and the share of long ones; `empty` is the level of the empty slide.
+/// Returns logarithms of the number of small objects per 1000 pixels, and the fraction of elongated ones; `empty` is
+/// the level of the empty slide.
 pub(crate) fn counts(grey: &[f32], width: usize, empty: f32) -> Vec<(String, f64)> {
     let height = grey.len() / width;
     let absorbance: Vec<f32> = grey.iter().map(|g| -libm::log10f((g / empty).max(LEAST_LIGHT))).collect();
@@ -248,17 +251,17 @@ pub(crate) fn counts(grey: &[f32], width: usize, empty: f32) -> Vec<(String, f64
         let thousands = grey.len() as f64 / 1000.0;
         for ((found, long), place) in found.into_iter().zip(long).zip(["on empty slide", "on cells"]) {
             out.extend(found.into_iter().zip(DARKNESS).map(|(count, level)| {
-                let name = format!("things of {scale} px above {level} {place}");
+                let name = format!("objects of {scale} px above {level} {place}");
                 (name, libm::log(f64::from(count) / thousands + 0.01))
             }));
-            let share = if found[0] >= 5 { f64::from(long) / f64::from(found[0]) } else { f64::NAN };
-            out.push((format!("long ones of {scale} px {place}"), share));
+            let fraction = if found[0] >= 5 { f64::from(long) / f64::from(found[0]) } else { f64::NAN };
+            out.push((format!("elongated objects of {scale} px {place}"), fraction));
         }
     }
     out
 }
 
-/// Whether a maximum is a ridge.
+/// Returns whether a maximum is elongated.
 fn is_long(band: &[f32], p: usize, width: usize) -> bool {
     let at = |q: usize| band[q];
     let xx = 2.0 * at(p) - at(p - 1) - at(p + 1);
@@ -269,7 +272,7 @@ fn is_long(band: &[f32], p: usize, width: usize) -> bool {
     mean + root > LONG * (mean - root).max(0.0)
 }
 
-/// A Gaussian, mirrored at the pixels of the border.
+/// Blurs with a Gaussian; border pixels are the mirror.
 fn blur(image: &[f32], width: usize, sigma: f64) -> Vec<f32> {
     let reach = whole(3.0 * sigma) + 1;
     let mut kernel: Vec<f32> =
@@ -294,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn what_fields_share_is_found() {
+    fn pattern_noise_is_measured() {
         let (width, height) = (400, 300);
         let shared = noise(1, width * height, 0.01);
         let field = |seed: u64| {
@@ -305,16 +308,16 @@ mod tests {
         let fields = [field(2), field(3), field(4)];
         let [variance, error] =
             pattern(&fields.each_ref().map(|f| f.relative.clone()), &Control::NONE).unwrap().unwrap();
-        // 1.2·10⁵ pixels: 5·10⁻⁷ of error, the pattern's own chance included.
+        // 1.2·10⁵ pixels: a standard error of 5·10⁻⁷.
         assert!((variance * fields[0].restored() - 1e-4).abs() < 1.5e-6, "{variance} {error}");
         assert_eq!(pattern(&[fields[0].relative.clone()], &Control::NONE), Ok(None));
-        // 2 and a hundredth of 220, on 1.2·10⁵ pixels.
+        // Variances of 2 and of 1 % of 220, on 1.2·10⁵ pixels.
         assert!((fields[0].deviation / (4.0_f64 + 4.84).sqrt() - 1.0).abs() < 0.02, "{}", fields[0].deviation);
-        assert!(fields[0].shared.iter().all(|s| s.abs() < 0.02), "{:?}", fields[0].shared);
+        assert!(fields[0].correlation.iter().all(|s| s.abs() < 0.02), "{:?}", fields[0].correlation);
     }
 
     #[test]
-    fn neighbours_that_share_noise_do_and_things_on_the_slide_do_not_count() {
+    fn correlated_noise_is_measured_without_objects() {
         let (width, height) = (300, 300);
         let own = noise(9, width * height + width + 1, 3.0);
         let mut grey: Vec<f32> =
@@ -324,24 +327,28 @@ mod tests {
         }
         let empty = Empty::new(&grey, width, 200.0);
         assert!((empty.deviation - 3.0).abs() < 0.05, "{}", empty.deviation);
-        assert!(empty.shared[0].abs() < 0.02 && (empty.shared[1] - 0.5).abs() < 0.02, "{:?}", empty.shared);
+        assert!(
+            empty.correlation[0].abs() < 0.02 && (empty.correlation[1] - 0.5).abs() < 0.02,
+            "{:?}",
+            empty.correlation
+        );
     }
 
     #[test]
-    fn photons_are_told_from_reading() {
+    fn photon_noise_and_read_noise_are_distinguished() {
         let (width, height) = (160, 160);
         let own = noise(5, width * height, 1.0);
         let light = |i: usize| if (i % width) < 80 { 220.0_f32 } else { 150.0 };
         let of = |sd: &dyn Fn(f32) -> f32| {
             let grey: Vec<f32> = own.iter().enumerate().map(|(i, n)| light(i) + n * sd(light(i))).collect();
-            law(&grey, width, 220.0)[1]
+            noise_by_darkness(&grey, width, 220.0)[1]
         };
         let (reading, photons) = (of(&|_| 2.0), of(&|l| (l / 55.0).sqrt()));
         assert!(reading.abs() < 0.1 && (photons - libm::log(150.0 / 220.0)).abs() < 0.1, "{reading} {photons}");
     }
 
     #[test]
-    fn a_blur_keeps_light_and_spreads_a_point_as_wide_as_asked() {
+    fn a_blur_keeps_the_sum_and_has_its_standard_deviation() {
         let width = 41;
         let mut image = vec![0.0; width * width];
         image[20 * width + 20] = 1.0;
@@ -355,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn dots_and_rods_are_counted_apart() {
+    fn dots_and_rods_are_counted_separately() {
         let width = 100;
         let mut grey = vec![200.0; width * width];
         for k in 0..5 {

@@ -1,63 +1,63 @@
-//! From values of parameters to a recipe, and back.
+//! Conversion between parameter values and recipes.
 
 use papsynth::recipe::{
-    Abundance, CellMix, Clusters, FocusOutput, Gaussians, Illumination, Law, Layout, Microscope, Number, Optics,
-    Preset, Quadratic, Recipe,
+    Abundance, CellMix, Clusters, Distribution, FocusOutput, Gaussians, Illumination, Layout, Microscope, Number,
+    Optics, Preset, Quadratic, Recipe,
 };
 
 use crate::parameter::{PARAMETERS, Parameter as P, Source, Values};
 
-/// What a recipe is made for.
+/// Fixed properties of a matched recipe.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
-    /// The recipe to begin with.
+    /// Initial recipe.
     pub base: Recipe,
-    /// Columns and rows of a field.
+    /// Width and height of a field.
     pub size_px: [usize; 2],
-    /// Size of a pixel, µm; [`P::Pixel`] takes its place where it is sought.
+    /// Pixel size, µm. [`P::Pixel`] replaces it if it is sought.
     pub pixel_um: f64,
-    /// Bits of a grey level.
+    /// Bits per pixel.
     pub bits: u32,
-    /// Whether neighbouring pixels share noise, as in pictures of extended focus.
+    /// Whether noise is correlated between pixels, as in images of extended depth of field.
     pub extended: bool,
-    /// Whether the size of a pixel is sought.
+    /// Whether the pixel size is sought.
     pub seek_pixel: bool,
-    /// Standard deviations between fields that were measured beside their means.
+    /// Measured standard deviations between fields.
     pub field_sd: FieldSd,
 }
 
 /// Standard deviations between fields.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FieldSd {
-    /// Of the bowl across.
-    pub across: f64,
-    /// Of the bowl down.
-    pub down: f64,
-    /// Of the logarithm of the noise.
+    /// Of the horizontal fall-off.
+    pub falloff_x: f64,
+    /// Of the vertical fall-off.
+    pub falloff_y: f64,
+    /// Of the logarithm of noise.
     pub noise: f64,
 }
 
 impl Default for FieldSd {
     fn default() -> Self {
-        Self { across: 0.008, down: 0.008, noise: 0.03 }
+        Self { falloff_x: 0.008, falloff_y: 0.008, noise: 0.03 }
     }
 }
 
-/// Levels of 8 bits.
+/// Maximum grey level of 8 bits.
 pub(crate) const LEVELS: f64 = 255.0;
 
-/// Part of its strength that scatter takes of the light on the mean.
-const TAKEN: f64 = 0.5;
+/// Mean loss of light by the background texture, relative to its strength.
+const TEXTURE_LOSS: f64 = 0.5;
 
-/// Variance of rounding to whole levels of 8 bits.
+/// Variance of rounding to grey levels of 8 bits.
 const ROUNDING: f64 = 1.0 / 12.0;
 
 impl Setting {
-    /// Whether a parameter can be sought here: not the density of clusters where there are none, for example.
+    /// Returns whether a parameter can be sought: not the radius of clusters without clusters, for example.
     #[must_use]
     pub fn seeks(&self, parameter: P) -> bool {
         match parameter {
-            P::Across | P::Down => self.extended,
+            P::NoiseCorrelationX | P::NoiseCorrelationY => self.extended,
             P::Pixel => self.seek_pixel,
             P::Size => !self.seek_pixel,
             P::Outside | P::ClusterRadius => matches!(self.base.layout, Layout::Clusters(_)),
@@ -66,12 +66,12 @@ impl Setting {
         }
     }
 
-    /// What the recipe to begin with says of each parameter.
+    /// Returns the values of the initial recipe.
     #[must_use]
     pub fn base_values(&self) -> Values {
         let base = &self.base;
         let area = base_area(base);
-        let level = centre(&base.background.level) - TAKEN * centre(&base.background.texture);
+        let level = centre(&base.background.level) - TEXTURE_LOSS * centre(&base.background.texture);
         let (x2, y2) = match &base.background.illumination {
             Illumination::Quadratic(Quadratic { falloff_x, falloff_y, .. }) => (centre(falloff_x), centre(falloff_y)),
             Illumination::Border(_) => (0.0, 0.0),
@@ -99,12 +99,12 @@ impl Setting {
         for (parameter, value) in [
             (P::Level, level),
             (P::LevelSd, spread(&base.background.level) * centre(&base.background.level)),
-            (P::BowlAcross, x2),
-            (P::BowlDown, y2),
+            (P::FalloffX, x2),
+            (P::FalloffY, y2),
             (P::Noise, noise.sqrt()),
             (P::Pattern, pattern * pattern / noise),
-            (P::Across, centre(&base.focus.noise_correlation_x)),
-            (P::Down, centre(&base.focus.noise_correlation_y)),
+            (P::NoiseCorrelationX, centre(&base.focus.noise_correlation_x)),
+            (P::NoiseCorrelationY, centre(&base.focus.noise_correlation_y)),
             (P::Pixel, centre(&base.field.pixel_um)),
             (P::Photons, photons / (photons + read * read).max(1e-9)),
             (P::Blur, centre(blur)),
@@ -132,7 +132,7 @@ impl Setting {
             (P::Speckles, density(&debris.speckles.count, area)),
             (P::Smudges, density(&debris.smudges.count, area)),
             (P::Dirt, density(&debris.dirt.clusters, area)),
-            (P::Scatter, centre(&base.background.texture)),
+            (P::BackgroundTexture, centre(&base.background.texture)),
         ] {
             values.set(parameter, value);
         }
@@ -140,7 +140,8 @@ impl Setting {
     }
 }
 
-/// The recipe of a setting with the values of parameters that are `fitted`; the others are those of the recipe to begin with.
+/// Returns the recipe of a setting with the values of `fitted` parameters. The others have the values of the initial
+/// recipe.
 #[must_use]
 pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) -> Recipe {
     let on = |parameter: P| setting.seeks(parameter) && fitted(parameter);
@@ -164,18 +165,18 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
     let or_base = |parameter: P| if on(parameter) { get(parameter) } else { base.get(parameter) };
 
     if either(P::Level, P::LevelSd) {
-        let level = or_base(P::Level) + TAKEN * or_base(P::Scatter);
+        let level = or_base(P::Level) + TEXTURE_LOSS * or_base(P::BackgroundTexture);
         r.background.level = cut(normal(level, or_base(P::LevelSd)), 0.05, 1.1);
     }
-    if either(P::BowlAcross, P::BowlDown) {
-        let off_centre = match &r.background.illumination {
-            Illumination::Bowl(Bowl { off_centre, .. }) => off_centre.clone(),
+    if either(P::FalloffX, P::FalloffY) {
+        let centre_offset = match &r.background.illumination {
+            Illumination::Quadratic(Quadratic { centre_offset, .. }) => centre_offset.clone(),
             Illumination::Border(_) => 0.0.into(),
         };
-        r.background.illumination = Illumination::Bowl(Bowl {
-            x2: cut(normal(or_base(P::BowlAcross), setting.field_sd.across), 0.0, 0.45),
-            y2: cut(normal(or_base(P::BowlDown), setting.field_sd.down), 0.0, 0.45),
-            off_centre,
+        r.background.illumination = Illumination::Quadratic(Quadratic {
+            falloff_x: cut(normal(or_base(P::FalloffX), setting.field_sd.falloff_x), 0.0, 0.45),
+            falloff_y: cut(normal(or_base(P::FalloffY), setting.field_sd.falloff_y), 0.0, 0.45),
+            centre_offset,
         });
     }
     camera(&mut r, setting, &on, &or_base);
@@ -190,7 +191,7 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
     ] {
         if either(median, log_sd) {
             *of_field = cut(log_normal(or_base(median), or_base(log_sd)), 0.0, 20.0);
-            // Fields of a handful are taken for fields of as many slides: what slides differ by is in what fields differ by.
+            // Each real field counts as one slide, so the variation between fields includes that between slides.
             of_slide.into_iter().for_each(|slide| *slide = 1.0.into());
         }
     }
@@ -207,12 +208,12 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
         }
     }
     cells(&mut r, &setting.base, &on, &or_base);
-    // From the value and what the recipe to begin with has.
+    // Returns the distribution for a value and the initial distribution.
     type Spread = fn(f64, &Number) -> Number;
     let mut single: Vec<(P, &mut Number, Spread)> = vec![
-        (P::Scatter, &mut r.background.texture, about),
-        (P::Across, &mut r.focus.noise_correlation_x, |value, _| number(value)),
-        (P::Down, &mut r.focus.noise_correlation_y, |value, _| number(value)),
+        (P::BackgroundTexture, &mut r.background.texture, about),
+        (P::NoiseCorrelationX, &mut r.focus.noise_correlation_x, |value, _| number(value)),
+        (P::NoiseCorrelationY, &mut r.focus.noise_correlation_y, |value, _| number(value)),
         (P::Depth, &mut r.slide.depth_um, |value, _| number(value)),
         (P::Dome, &mut r.nucleus.dome, |value, _| within(value, 0.2)),
         (P::Rim, &mut r.nucleus.rim, |value, _| Number::uniform(0.0, rounded(2.0 * value))),
@@ -236,7 +237,7 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
         if !on(parameter) {
             *count = per_mm2(count, base_area(&setting.base), 1.0);
         } else {
-            // What a preset has none of has no spread to keep.
+            // A count of zero has no standard deviation to keep.
             let log_sd = if spread > 0.0 { spread.min(1.0) } else { 0.6 };
             *count = Abundance::per_mm2(log_normal(get(parameter), log_sd));
         }
@@ -244,10 +245,10 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
     r
 }
 
-/// Classes of cells whose share is sought.
+/// Classes of cells whose fraction is sought.
 const PAIR: [&str; 2] = ["superficial", "intermediate"];
 
-/// How many there are of them.
+/// Returns the numbers of cells of these classes.
 fn of_pair(recipe: &Recipe) -> [f64; 2] {
     let area = base_area(recipe);
     PAIR.map(|class| recipe.cells.get(class).map_or(0.0, |mix| density(&mix.count, area)))
@@ -258,17 +259,17 @@ fn base_area(base: &Recipe) -> f64 {
     w * h * p * p * 1e-6
 }
 
-/// Light of the empty slide with the glare that is taken off, in grey levels of what is left.
+/// Returns the light of the empty slide including the subtracted glare, in grey levels after subtraction.
 fn signal(level: f64, glare: f64) -> f64 {
     LEVELS * (level + glare / (1.0 - glare))
 }
 
-/// The noise of the empty slide, divided between photons, reading and a pattern.
+/// Sets photon noise, read noise and pattern noise from the noise of the empty slide.
 fn camera(r: &mut Recipe, setting: &Setting, on: &impl Fn(P) -> bool, or_base: &impl Fn(P) -> f64) {
     if !(on(P::Noise) || on(P::Photons) || on(P::Pattern)) {
         return;
     }
-    /// Neither part is less than this of what is left of the noise.
+    /// Minimum fraction of photon noise and of read noise.
     const LEAST: f64 = 0.02;
     let glare = centre(&r.camera.glare_subtracted);
     let signal = signal(or_base(P::Level), glare);
@@ -280,7 +281,7 @@ fn camera(r: &mut Recipe, setting: &Setting, on: &impl Fn(P) -> bool, or_base: &
     let read = per_dn * ((1.0 - photons) * rest).sqrt();
     let camera = &mut r.camera;
     camera.full_well_e = number(per_dn * LEVELS / (1.0 - glare));
-    // A spread of all noise is laid on the reading alone.
+    // Only the read noise varies between fields.
     let spread = (setting.field_sd.noise / (1.0 - photons)).min(0.5);
     camera.read_noise_e = if spread > 0.02 { log_normal(read, spread) } else { number(read) };
     camera.read_noise_rms_e = 0.0.into();
@@ -326,7 +327,7 @@ fn blur(optics: &mut Optics) -> &mut Number {
     }
 }
 
-/// To so many digits, as recipes are read by people.
+/// Rounds to significant digits.
 pub(crate) fn rounded_to(value: f64, digits: i32) -> f64 {
     if value == 0.0 || !value.is_finite() {
         return value;
@@ -335,7 +336,7 @@ pub(crate) fn rounded_to(value: f64, digits: i32) -> f64 {
     libm::round(value * scale) / scale
 }
 
-/// To as many digits as a recipe is read with.
+/// Rounds to the digits of recipes.
 fn rounded(value: f64) -> f64 {
     rounded_to(value, 4)
 }
@@ -352,7 +353,7 @@ fn log_normal(median: f64, log_sd: f64) -> Number {
     if rounded(log_sd) > 0.0 { Number::log_normal(rounded(median), rounded(log_sd)) } else { number(median) }
 }
 
-/// Uniform so far to both sides, but from 0 to 1.
+/// Returns a uniform distribution around a value, within 0 to 1.
 fn within(middle: f64, half: f64) -> Number {
     let half = half.min(middle.max(0.0)).min((1.0 - middle).max(0.0));
     if half > 0.0 {
@@ -362,30 +363,30 @@ fn within(middle: f64, half: f64) -> Number {
     }
 }
 
-/// Nothing beyond what a recipe accepts, where the distribution reaches there.
+/// Truncates a distribution to the accepted range if it exceeds the range.
 fn cut(number: Number, low: f64, high: f64) -> Number {
     let [least, most] = number.bounds();
     let number = if least < low { number.at_least(low) } else { number };
     if most > high { number.at_most(high) } else { number }
 }
 
-/// A distribution like another, about another middle.
+/// Scales a distribution to another centre.
 fn about(middle: f64, like: &Number) -> Number {
     let now = centre(like);
     if now > 0.0 { times(like, middle / now) } else { number(middle) }
 }
 
-/// A distribution with everything in it multiplied.
+/// Multiplies a distribution by a factor.
 fn times(number: &Number, factor: f64) -> Number {
     let by = |value: &f64| rounded(value * factor);
     match number {
         Number::Fixed(value) => Number::Fixed(by(value)),
-        Number::Drawn { law, min, max } => Number::Drawn {
-            law: match law {
-                Law::Uniform(a, b) => Law::Uniform(by(a), by(b)),
-                Law::Normal(a, b) => Law::Normal(by(a), by(b)),
-                Law::LogNormal(median, log_sd) => Law::LogNormal(by(median), *log_sd),
-                Law::Choice(values) => Law::Choice(values.iter().map(by).collect()),
+        Number::Drawn { distribution, min, max } => Number::Drawn {
+            distribution: match distribution {
+                Distribution::Uniform(a, b) => Distribution::Uniform(by(a), by(b)),
+                Distribution::Normal(a, b) => Distribution::Normal(by(a), by(b)),
+                Distribution::LogNormal(median, log_sd) => Distribution::LogNormal(by(median), *log_sd),
+                Distribution::Choice(values) => Distribution::Choice(values.iter().map(by).collect()),
             },
             min: if min.is_finite() { by(min) } else { *min },
             max: if max.is_finite() { by(max) } else { *max },
@@ -403,34 +404,34 @@ fn per_mm2(abundance: &Abundance, area: f64, factor: f64) -> Abundance {
     Abundance::per_mm2(times(abundance.number(), factor / if abundance.is_density() { 1.0 } else { area }))
 }
 
-/// The middle of a distribution: the median of a log-normal, the mean of others.
+/// Returns the centre of a distribution: the median of a log-normal one, the mean of others.
 pub(crate) fn centre(number: &Number) -> f64 {
     match number {
         Number::Fixed(value) => *value,
-        Number::Drawn { law, .. } => match law {
-            Law::Uniform(a, b) => 0.5 * (a + b),
-            Law::Normal(mean, _) => *mean,
-            Law::LogNormal(median, _) => *median,
-            Law::Choice(values) => values.iter().sum::<f64>() / values.len().max(1) as f64,
+        Number::Drawn { distribution, .. } => match distribution {
+            Distribution::Uniform(a, b) => 0.5 * (a + b),
+            Distribution::Normal(mean, _) => *mean,
+            Distribution::LogNormal(median, _) => *median,
+            Distribution::Choice(values) => values.iter().sum::<f64>() / values.len().max(1) as f64,
         },
     }
 }
 
-/// Standard deviation over the middle, or of the logarithm.
+/// Returns the standard deviation over the centre, or that of the logarithm.
 pub(crate) fn spread(number: &Number) -> f64 {
     let relative = |sd: f64| sd / centre(number).abs().max(1e-9);
     match number {
         Number::Fixed(_) => 0.0,
-        Number::Drawn { law, .. } => match law {
-            Law::Uniform(a, b) => relative((b - a) / 12.0_f64.sqrt()),
-            Law::Normal(_, sd) => relative(*sd),
-            Law::LogNormal(_, log_sd) => *log_sd,
-            Law::Choice(values) => relative(portable_numerics::statistics::deviation(values)),
+        Number::Drawn { distribution, .. } => match distribution {
+            Distribution::Uniform(a, b) => relative((b - a) / 12.0_f64.sqrt()),
+            Distribution::Normal(_, sd) => relative(*sd),
+            Distribution::LogNormal(_, log_sd) => *log_sd,
+            Distribution::Choice(values) => relative(portable_numerics::statistics::deviation(values)),
         },
     }
 }
 
-/// Those parameters that are found by simulation in a setting.
+/// Returns the parameters that are found by simulation.
 pub(crate) fn simulated(setting: &Setting) -> Vec<P> {
     PARAMETERS.into_iter().filter(|p| setting.seeks(*p) && p.prior().source == Source::Simulated).collect()
 }
@@ -452,7 +453,7 @@ mod tests {
     }
 
     #[test]
-    fn every_corner_of_the_ranges_is_a_recipe() {
+    fn recipes_at_the_limits_of_all_ranges_are_valid() {
         for preset in Preset::ALL {
             let setting = Setting { base: preset.recipe(), ..setting(true) };
             for place in [0.0, 0.5, 1.0] {
@@ -469,7 +470,7 @@ mod tests {
     }
 
     #[test]
-    fn a_recipe_gives_back_its_values() {
+    fn values_of_a_recipe_are_read_back() {
         let setting = setting(true);
         let values = Values::at(&std::array::from_fn(|i| 0.2 + 0.6 * (i as f64) / PARAMETERS.len() as f64));
         let made = recipe(&setting, &values, |_| true);

@@ -1,4 +1,4 @@
-//! From an estimate to the recipe whose simulated windows come nearest to the real ones.
+//! Search for the recipe with the smallest distance between simulated and real windows.
 
 use argmin::core::{CostFunction, Executor, Gradient, State};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
@@ -10,26 +10,27 @@ use crate::error::Error;
 use crate::regression::{Estimate, Features, Scaler};
 use crate::table::SimulationTable;
 
-/// Statistics further apart than so many standard errors count in proportion: what a recipe cannot show must not bend the rest.
-const FAR: f64 = 3.0;
+/// Beyond this difference, in standard errors, the loss is linear, so that statistics that no recipe can match have
+/// less weight.
+const LINEAR_FROM: f64 = 3.0;
 
-/// Steps of the optimiser, and gradients that it remembers.
+/// Maximum number of iterations of the optimiser, and number of stored gradients.
 const STEPS: u64 = 200;
 const MEMORY: usize = 7;
 
-/// How strongly the place is held near that of the regression.
-const HOLD: f64 = 1.0;
+/// Weight of the distance from the estimate of the regression.
+const PRIOR_WEIGHT: f64 = 1.0;
 
-/// What windows are like as a function of the places of parameters: a parabola through the table, and how far recipes lie from it.
+/// A quadratic model of the statistics as functions of the positions of parameters, with its standard errors.
 pub(crate) struct Forward {
     scaler: Scaler,
-    /// Factors of 1, places and their squares, statistic by statistic.
+    /// Coefficients of 1, positions and their squares, for each statistic.
     factors: Vec<Vec<f64>>,
     /// Standard error of each scaled statistic.
     errors: Vec<f64>,
 }
 
-/// Least standard error of a statistic, in its standard deviations over the table: nothing follows a parabola more closely.
+/// Minimum standard error of a statistic, in standard deviations over the table.
 const LEAST_ERROR: f64 = 0.05;
 
 impl Forward {
@@ -56,7 +57,8 @@ impl Forward {
         factors[0] + factors[1..].iter().zip(features).map(|(a, b)| a * b).sum::<f64>()
     }
 
-    /// How many standard errors each statistic lies from that of the real fields; NaN where either is unknown.
+    /// Returns the difference of each statistic from that of the real fields, in standard errors; NaN if one is
+    /// unknown.
     pub(crate) fn apart(&self, real: &[f64], simulated: &[f64]) -> Vec<f64> {
         let (a, b) = (self.scaler.scaled(real), self.scaler.scaled(simulated));
         let known = real.iter().zip(simulated).map(|(x, y)| x.is_finite() && y.is_finite());
@@ -65,7 +67,7 @@ impl Forward {
     }
 }
 
-/// Root of the mean square of distances, far ones in proportion.
+/// Returns the root mean square of differences; the loss of large differences is linear.
 pub(crate) fn distance(apart: &[f64]) -> f64 {
     let known: Vec<f64> = apart.iter().filter(|z| z.is_finite()).map(|z| robust(*z)).collect();
     portable_numerics::statistics::mean(&known).sqrt()
@@ -73,33 +75,33 @@ pub(crate) fn distance(apart: &[f64]) -> f64 {
 
 fn robust(z: f64) -> f64 {
     let a = z.abs();
-    if a < FAR { z * z } else { FAR * (2.0 * a - FAR) }
+    if a < LINEAR_FROM { z * z } else { LINEAR_FROM * (2.0 * a - LINEAR_FROM) }
 }
 
 fn robust_slope(z: f64) -> f64 {
-    if z.abs() < FAR { 2.0 * z } else { 2.0 * FAR * z.signum() }
+    if z.abs() < LINEAR_FROM { 2.0 * z } else { 2.0 * LINEAR_FROM * z.signum() }
 }
 
-/// Places about the middle of their ranges and their squares.
+/// Returns positions relative to the centres of their ranges, and their centred squares.
 fn features(places: &[f64]) -> Vec<f64> {
     let about = |p: &f64| 2.0 * p - 1.0;
     places.iter().map(about).chain(places.iter().map(|p| about(p) * about(p) - 1.0 / 3.0)).collect()
 }
 
-/// What is minimised: the distance that the parabolas tell, with what they were wrong by at the last simulation taken off.
+/// The objective: the distance predicted by the quadratic model, corrected by its error at the last simulation.
 #[derive(Clone)]
 struct Objective<'a> {
     forward: &'a Forward,
-    /// Statistics that count, and where they should be by the parabolas.
+    /// Known statistics, and the model value that each should have.
     aims: Vec<(usize, f64)>,
-    /// All places; those that do not move keep theirs.
+    /// All positions. Only those of `moving` change.
     places: Vec<f64>,
-    /// Those that move, with the ends of their intervals and where the regression saw them.
+    /// Parameters to optimise, with their estimates and intervals.
     moving: Vec<(usize, Estimate)>,
 }
 
 impl Objective<'_> {
-    /// Places within the intervals, from numbers without bounds; with the slopes.
+    /// Maps unbounded numbers to positions within the intervals. Returns positions and derivatives.
     fn inside(&self, free: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let mut places = self.places.clone();
         let mut slopes = Vec::with_capacity(free.len());
@@ -112,7 +114,7 @@ impl Objective<'_> {
     }
 
     fn outside(&self, places: &[f64]) -> Vec<f64> {
-        /// Not further than this towards the ends: there the slope is gone.
+        /// Maximum distance from the centre, because the derivative vanishes at the ends.
         const MOST: f64 = 0.98;
         let one = |(i, e): &(usize, Estimate)| {
             libm::atanh((2.0 * (places[*i] - e.low) / (e.high - e.low).max(1e-9) - 1.0).clamp(-MOST, MOST))
@@ -120,8 +122,8 @@ impl Objective<'_> {
         self.moving.iter().map(one).collect()
     }
 
-    fn hold(&self, places: &[f64]) -> impl Iterator<Item = f64> {
-        // Half an interval is two standard errors.
+    fn deviations(&self, places: &[f64]) -> impl Iterator<Item = f64> {
+        // Half the interval is two standard errors.
         self.moving.iter().map(|(i, e)| 4.0 * (places[*i] - e.value) / (e.high - e.low).max(1e-9))
     }
 }
@@ -135,7 +137,7 @@ impl CostFunction for Objective<'_> {
         let features = features(&places);
         let apart =
             self.aims.iter().map(|(s, aim)| robust((self.forward.at(*s, &features) - aim) / self.forward.errors[*s]));
-        Ok(apart.sum::<f64>() + HOLD * self.hold(&places).map(|z| z * z).sum::<f64>())
+        Ok(apart.sum::<f64>() + PRIOR_WEIGHT * self.deviations(&places).map(|z| z * z).sum::<f64>())
     }
 }
 
@@ -157,29 +159,30 @@ impl Gradient for Objective<'_> {
             }
         }
         let one = |(((i, e), slope), hold): ((&(usize, Estimate), f64), f64)| {
-            slope * (of_places[*i] + HOLD * 2.0 * hold * 4.0 / (e.high - e.low).max(1e-9))
+            slope * (of_places[*i] + PRIOR_WEIGHT * 2.0 * hold * 4.0 / (e.high - e.low).max(1e-9))
         };
-        Ok(self.moving.iter().zip(slopes).zip(self.hold(&places)).map(one).collect())
+        Ok(self.moving.iter().zip(slopes).zip(self.deviations(&places)).map(one).collect())
     }
 }
 
-/// The next place to try from one whose windows were simulated; `seen` are the statistics of the real windows and of those.
+/// Proposes positions for the next simulation. `seen` are the statistics of the real windows, and of windows simulated
+/// at `places`.
 pub(crate) fn propose(forward: &Forward, seen: [&[f64]; 2], places: &[f64], moving: &[(usize, Estimate)]) -> Vec<f64> {
     let [wanted, found] = seen.map(|values| forward.scaler.scaled(values));
     let here = features(places);
     let known = |s: &usize| seen.iter().all(|values| values[*s].is_finite());
     let aims = (0..wanted.len()).filter(known).map(|s| (s, wanted[s] - found[s] + forward.at(s, &here))).collect();
-    let told = Objective { forward, aims, places: places.to_vec(), moving: moving.to_vec() };
-    let start = told.outside(places);
+    let objective = Objective { forward, aims, places: places.to_vec(), moving: moving.to_vec() };
+    let start = objective.outside(places);
     if start.is_empty() {
         return places.to_vec();
     }
     let solver = LBFGS::new(MoreThuenteLineSearch::new(), MEMORY);
-    let best = Executor::new(told.clone(), solver)
+    let best = Executor::new(objective.clone(), solver)
         .configure(|state| state.param(start.clone()).max_iters(STEPS))
         .timer(false)
         .run()
         .ok()
         .and_then(|result| result.state().get_best_param().cloned());
-    told.inside(&best.unwrap_or(start)).0
+    objective.inside(&best.unwrap_or(start)).0
 }

@@ -1,10 +1,11 @@
-//! From what windows are like to the parameters of their recipe, with intervals that are held to what they say.
+//! Regression of parameters on statistics, with calibrated intervals.
 //!
-//! Semi-automatic approximate Bayesian computation (Fearnhead and Prangle, doi:10.1111/j.1467-9868.2011.01010.x): a first
-//! regression makes of all statistics one summary a parameter; a second one, that bends, goes from these to the parameter.
-//! Intervals are those of cross-conformal prediction (doi:10.1007/s10472-013-9368-4), wider where unseen rows were missed by more
-//! (normalised as by Papadopoulos and Haralambous, doi:10.1016/j.neunet.2011.05.008). Rows are unseen by everything that tells
-//! them: scales, both regressions and the choice of their penalties.
+//! Semi-automatic approximate Bayesian computation (Fearnhead and Prangle, doi:10.1111/j.1467-9868.2011.01010.x): a
+//! first, linear regression reduces all statistics to one summary per parameter. A second, nonlinear regression
+//! predicts the parameters from the summaries. Intervals are from cross-conformal prediction
+//! (doi:10.1007/s10472-013-9368-4), normalised by the expected error (Papadopoulos and Haralambous,
+//! doi:10.1016/j.neunet.2011.05.008). The held-out rows are held out of all steps: scaling, both regressions, and the
+//! choice of their penalties.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use papsynth_judge::{Control, Phase};
@@ -18,29 +19,29 @@ use crate::error::Error;
 /// A value with its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
-    /// The value.
+    /// Value.
     pub value: f64,
-    /// Lower end of the interval.
+    /// Lower limit of the interval.
     pub low: f64,
-    /// Upper end.
+    /// Upper limit of the interval.
     pub high: f64,
 }
 
-/// An interval wider than this part of its range says too little: the parameter counts as not identified.
+/// A parameter is not identified if its interval is wider than this fraction of its range.
 pub const WIDEST: f64 = 0.5;
 
-/// Part of the intervals that hold the truth.
+/// Fraction of the intervals that contain the true value.
 const CONFIDENCE: f64 = 0.95;
 
-/// Statistics further from the mean of the table than so many standard deviations count as being there.
+/// Scaled statistics are clipped to this number of standard deviations.
 const FARTHEST: f64 = 4.0;
 
-/// Added to misses before their logarithm is taken: none is the better for being right by chance.
+/// Added to errors before the logarithm, so that an error that is small by chance has little influence.
 const LEAST_MISS: f64 = 0.02;
 
-/// Brings statistics to one scale; what is unknown counts as the mean, and what lies beyond all rows as the farthest of them.
+/// Standardises statistics. Unknown values become the mean, and values are clipped to the range of the rows.
 ///
-/// Of each, mean, standard deviation, least and largest value.
+/// Holds mean, standard deviation, minimum and maximum of each statistic.
 #[derive(Debug, Clone)]
 pub(crate) struct Scaler(Vec<[f64; 4]>);
 
@@ -67,7 +68,7 @@ impl Scaler {
     }
 }
 
-/// Learns parameters, as places in their ranges, from statistics.
+/// A regression of parameters, as positions in their ranges, on statistics.
 #[derive(Debug, Clone)]
 pub struct Regression {
     predictor: Predictor,
@@ -76,10 +77,10 @@ pub struct Regression {
 }
 
 impl Regression {
-    /// Learns from rows of statistics and rows of places.
+    /// Fits rows of positions to rows of statistics.
     #[must_use]
     pub fn new(statistics: &[Vec<f64>], places: &[Vec<f64>]) -> Self {
-        // Without a stop flag there is no error.
+        // Only the stop flag causes an error, and it is never set here.
         Self::new_with(statistics, places, &Control::NONE).unwrap_or_else(|_| unreachable!())
     }
 
@@ -90,17 +91,17 @@ impl Regression {
     pub fn new_with(statistics: &[Vec<f64>], places: &[Vec<f64>], control: &Control) -> Result<Self, Error> {
         let (n, columns) = (statistics.len(), places.first().map_or(0, Vec::len));
         let phase = control.phase("fitting regressions", (2 * (FOLDS + 1) + 1) * columns);
-        // Fit number FOLDS leaves no row out.
+        // Fit number FOLDS uses all rows.
         let without = |fold: usize| {
             Predictor::new(statistics, places, &(0..n).filter(|i| i % FOLDS != fold).collect::<Vec<_>>(), &phase)
         };
         let mut fits: Vec<Predictor> = (0..=FOLDS).into_par_iter().map(without).collect::<Result<_, Error>>()?;
-        // Out of fold: each row is predicted by the fit that left it out.
+        // Each row is predicted by the fit without it.
         let summaries: Vec<Vec<f64>> = (0..n).map(|row| fits[row % FOLDS].summary(&statistics[row])).collect();
         let values: Vec<Vec<f64>> = (0..n).map(|row| fits[row % FOLDS].values(&summaries[row])).collect();
         let predictor = fits.swap_remove(FOLDS);
         let missed = |c: usize| -> Vec<f64> { values.iter().zip(places).map(|(v, p)| (v[c] - p[c]).abs()).collect() };
-        // Places are spread evenly over 0 to 1.
+        // Positions are uniform over 0 to 1, with variance 1/12.
         let explained = |c| 1.0 - 12.0 * missed(c).iter().map(|m| m * m).sum::<f64>() / n.max(1) as f64;
         let column = |c: usize| values.iter().map(|v| v[c]).collect::<Vec<_>>();
         let interval = |c| -> Result<IntervalModel, Error> {
@@ -112,7 +113,7 @@ impl Regression {
         Ok(Self { predictor, intervals, explained: (0..columns).map(explained).collect() })
     }
 
-    /// The places of statistics, with their intervals, within 0 to 1.
+    /// Returns the positions for statistics, with their intervals, within 0 to 1.
     #[must_use]
     pub fn estimate(&self, statistics: &[f64]) -> Vec<Estimate> {
         let summary = self.predictor.summary(statistics);
@@ -123,14 +124,14 @@ impl Regression {
         values.into_iter().zip(&self.intervals).enumerate().map(with).collect()
     }
 
-    /// Part of each parameter's variance over the table that unseen rows were told.
+    /// Returns the explained fraction of the variance of each parameter, on held-out rows.
     #[must_use]
     pub fn explained(&self) -> &[f64] {
         &self.explained
     }
 }
 
-/// What rows of statistics tell: values without intervals.
+/// Predicts values without intervals.
 #[derive(Debug, Clone)]
 struct Predictor {
     scaler: Scaler,
@@ -171,12 +172,13 @@ impl Predictor {
     }
 }
 
-/// A summary in standard deviations of the parameter's range, not its own: what hardly varies tells nothing.
+/// Scales a summary by the standard deviation of the range of the parameter, so that a summary with little variation
+/// stays small.
 fn of_one_scale(place: f64) -> f64 {
     ((place - 0.5) * 12.0_f64.sqrt()).clamp(-FARTHEST, FARTHEST)
 }
 
-/// The ridge in which each statistic counts as much as it goes with the parameter by itself: of two hundred, most have no say in it.
+/// Fits a ridge regression in which each statistic is weighted by its correlation with the parameter.
 fn weighted(rows: &[Vec<f64>], y: &[f64]) -> Ridge {
     let middle = mean(y);
     let weight = |s: usize| {
@@ -195,7 +197,8 @@ fn weighted(rows: &[Vec<f64>], y: &[f64]) -> Ridge {
     ridge
 }
 
-/// Features of the second regression: the parameter's own summary and its powers, all others, and each with the own one.
+/// Returns the features of the second regression: powers of the summary of the parameter, all summaries, and their
+/// products with the summary of the parameter.
 fn bent(summary: &[f64], own: usize) -> Vec<f64> {
     let x = summary[own];
     let few = 1.0 / (summary.len() as f64).sqrt();
@@ -205,38 +208,38 @@ fn bent(summary: &[f64], own: usize) -> Vec<f64> {
     row
 }
 
-/// How far intervals reach.
+/// Half-widths of intervals.
 #[derive(Debug, Clone)]
 struct IntervalModel {
-    /// Logarithm of the usual miss.
+    /// Model of the logarithm of the expected error.
     misses: Ridge,
-    /// Intervals reach so many times the usual miss.
+    /// Half-width over the expected error.
     times: f64,
 }
 
 impl IntervalModel {
-    /// From the summaries, values and misses of unseen rows.
+    /// Fits the model to summaries, values and errors of held-out rows.
     fn new(summaries: &[Vec<f64>], own: usize, values: &[f64], missed: &[f64]) -> Self {
         let rows: Vec<Vec<f64>> = summaries.iter().map(|s| bent(s, own)).collect();
         let logarithms: Vec<f64> = missed.iter().map(|m| libm::log(m + LEAST_MISS)).collect();
         let misses = Features::new(&rows).best(&logarithms);
-        // A row's own miss has no part in what is usual about it.
+        // The expected error of a row is from the fit without it.
         let usual: Vec<f64> = misses.unseen.iter().map(|u| libm::exp(*u)).collect();
-        let asked = |which: &dyn Fn(usize) -> bool| {
+        let ratio = |which: &dyn Fn(usize) -> bool| {
             let mut times: Vec<f64> = (0..missed.len()).filter(|i| which(*i)).map(|i| missed[i] / usual[i]).collect();
             times.sort_unstable_by(f64::total_cmp);
-            // As many of n + 1 as the confidence asks: the new one is one of them.
+            // Conformal rank: the new row is one of n + 1.
             let rank = papsynth_judge::number::whole(libm::ceil(CONFIDENCE * (times.len() as f64 + 1.0))).max(1);
             times.get(rank - 1).copied().unwrap_or(f64::INFINITY)
         };
-        let mut model = Self { misses, times: asked(&|_| true) };
-        // What counts is how often those intervals hold that are narrow enough to be told: of too few of them nothing is known.
+        let mut model = Self { misses, times: ratio(&|_| true) };
+        // The coverage of the reported intervals counts, which are the narrow ones.
         loop {
             let narrow = |i: usize| {
                 let e = model.interval(values[i], usual[i]);
                 e.high - e.low <= WIDEST
             };
-            let times = asked(&narrow);
+            let times = ratio(&narrow);
             if times <= model.times || !(0..values.len()).any(narrow) {
                 return model;
             }
@@ -254,43 +257,43 @@ impl IntervalModel {
     }
 }
 
-/// Penalties that are tried, each a part of the rows' mean square.
+/// Candidate penalties, relative to the mean square of the rows.
 const PENALTIES: [f64; 11] = [1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0];
 
-/// Rows are left out by as many folds, every tenth row together.
+/// Number of cross-validation folds; a fold holds every tenth row.
 const FOLDS: usize = 10;
 
-/// Directions in which rows differ by less than this part of the most are none.
+/// Minimum eigenvalue, relative to the largest one.
 const LEAST: f64 = 1e-12;
 
-/// Rows of features, taken apart once for all that is regressed on them: X = U S Vᵀ.
+/// Singular value decomposition of rows of features, X = U S Vᵀ, for several regressions.
 pub(crate) struct Features {
-    /// U, a row a row.
+    /// U: one row per row.
     turned: DMatrix<f64>,
     /// S².
     squares: DVector<f64>,
-    /// V S⁻¹, a row a feature.
+    /// V S⁻¹: one row per feature.
     back: DMatrix<f64>,
     scale: f64,
 }
 
-/// Factors of features, and what each row would have been told by those of other folds.
+/// Coefficients of features, and the prediction of each row from the other folds.
 #[derive(Debug, Clone)]
 pub(crate) struct Ridge {
     pub(crate) mean: f64,
     pub(crate) factors: Vec<f64>,
     pub(crate) unseen: Vec<f64>,
-    /// Mean square by which unseen rows were missed.
+    /// Mean squared error of held-out rows.
     pub(crate) error: f64,
 }
 
 impl Features {
-    /// Of rows of the same length.
+    /// Decomposes rows of the same length.
     pub(crate) fn new(rows: &[Vec<f64>]) -> Self {
         let (n, p) = (rows.len(), rows.first().map_or(0, Vec::len));
         let x = DMatrix::from_fn(n, p, |i, j| rows[i][j]);
         let scale = x.norm_squared() / n.max(1) as f64;
-        // Of the smaller product of X with itself: the other one has the same S.
+        // Uses the smaller one of XᵀX and XXᵀ: both have the eigenvalues S².
         let few = p <= n;
         let eigen = SymmetricEigen::new(if few { x.tr_mul(&x) } else { &x * x.transpose() });
         let most = eigen.eigenvalues.iter().copied().fold(0.0, f64::max);
@@ -310,7 +313,7 @@ impl Features {
         Self { turned, squares, back, scale }
     }
 
-    /// The ridge through values whose error on unseen rows is least.
+    /// Fits a ridge regression with the penalty of the smallest error on held-out rows.
     pub(crate) fn best(&self, y: &[f64]) -> Ridge {
         let mean = mean(y);
         let centred = DVector::from_iterator(y.len(), y.iter().map(|v| v - mean));
@@ -328,8 +331,8 @@ impl Features {
         best
     }
 
-    /// What the rows of each fold would have been told by all others. Single rows would not do: the mean of the others is low where
-    /// a row is high, which the next regression would learn from.
+    /// Returns the prediction of the rows of each fold from the other folds. Leave-one-out would bias the next
+    /// regression: the mean of the other rows is low if a row is high.
     fn unseen(&self, y: &[f64], centred: &DVector<f64>, turned: &DVector<f64>, kept: &DVector<f64>) -> Vec<f64> {
         let mut unseen = y.to_vec();
         let rest = centred - &self.turned * turned.component_mul(kept);
@@ -338,7 +341,7 @@ impl Features {
             let own = self.turned.select_rows(&rows);
             let scaled = DMatrix::from_fn(rows.len(), kept.len(), |i, j| own[(i, j)] * kept[j]);
             let of_fold = DVector::from_iterator(rows.len(), rows.iter().map(|i| rest[*i]));
-            // The fold's own part in its predictions is taken out: exact for a given mean.
+            // Removes the influence of the fold on its predictions: exact for a given mean.
             let others = DMatrix::identity(rows.len(), rows.len()) - scaled * own.transpose();
             if let Some(rest) = others.cholesky().map(|c| c.solve(&of_fold)) {
                 for (i, r) in rows.iter().zip(rest.iter()) {
@@ -351,13 +354,13 @@ impl Features {
 }
 
 impl Ridge {
-    /// For a row of features.
+    /// Predicts the value of a row of features.
     pub(crate) fn predict(&self, row: &[f64]) -> f64 {
         self.mean + self.factors.iter().zip(row).map(|(f, x)| f * x).sum::<f64>()
     }
 }
 
-/// The least and the largest value.
+/// Returns minimum and maximum.
 pub(crate) fn min_max(values: &[f64]) -> [f64; 2] {
     values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(*v), high.max(*v)])
 }
@@ -368,7 +371,7 @@ mod tests {
     use portable_numerics::random::uniform;
     use rand_core::SeedableRng;
 
-    /// Statistics that bend, disturbed, of two parameters, and a third that shows in none.
+    /// Noisy nonlinear statistics of two parameters, and a third parameter without influence.
     fn rows(seed: u64, count: usize) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
         let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut one = || uniform(&mut rng);
@@ -391,7 +394,7 @@ mod tests {
     }
 
     #[test]
-    fn intervals_hold_what_they_say_and_what_cannot_be_told_is_wide() {
+    fn intervals_have_their_coverage_and_undetermined_parameters_have_wide_ones() {
         const TABLES: u64 = 8;
         const TRIALS: usize = 200;
         let (mut inside, mut width, mut explained) = ([0.0; 3], [0.0; 3], [0.0; 3]);
@@ -410,13 +413,13 @@ mod tests {
                 *sum += part / TABLES as f64;
             }
         }
-        // Eight quantiles of 150: a standard error of .7 %, and .5 % of the trials.
+        // Standard error: 0.7 % from eight quantiles of 150 rows, and 0.5 % from the trials.
         assert!(inside.iter().all(|part| (0.92..=0.98).contains(part)), "{inside:?}");
         assert!(explained[0] > 0.95 && explained[1] > 0.95 && explained[2] < 0.1, "{explained:?}");
         assert!(width[0] < 0.25 && width[1] < 0.2 && width[2] > 0.85, "{width:?}");
     }
 
-    /// With few rows and with more features than rows.
+    /// With fewer and with more features than rows.
     #[test]
     fn the_error_on_unseen_rows_is_that_of_leaving_them_out() {
         for (n, p) in [(25, 4), (25, 40)] {
@@ -426,7 +429,7 @@ mod tests {
             let found = Features::new(&rows).best(&y);
             let mean = mean(&y);
             let scale = rows.iter().flatten().map(|v| v * v).sum::<f64>() / n as f64;
-            // The slow way, with each penalty, a fold left out and the mean kept.
+            // Direct computation for each penalty, without the fold and with the mean of all rows.
             let factors = |penalty: f64, kept: &dyn Fn(usize) -> bool| {
                 let kept: Vec<usize> = (0..n).filter(|i| kept(*i)).collect();
                 let x = DMatrix::from_fn(kept.len(), p, |i, j| rows[kept[i]][j]);

@@ -1,4 +1,4 @@
-//! What windows are like, in numbers that regressions learn from.
+//! Statistics of windows for the regressions.
 
 use papsynth_judge::number::{single, whole};
 use papsynth_judge::{Control, FeatureTable, Field, FieldImage, Statistics};
@@ -9,57 +9,57 @@ use crate::noise;
 use crate::view::WindowSampler;
 use portable_numerics::statistics::{deviation, mean, quantile};
 
-/// How a number enters.
+/// Transform of a feature.
 #[derive(Clone, Copy)]
 enum Transform {
-    Itself,
-    /// The logarithm of it and so much.
+    Identity,
+    /// Logarithm of the value plus an offset.
     Log(f64),
 }
 
 impl Transform {
     fn of(self, value: f64) -> f64 {
         match self {
-            Self::Itself => value,
-            // What is unknown stays so.
+            Self::Identity => value,
+            // NaN stays NaN.
             Self::Log(more) => libm::log((value + more).clamp(1e-9, f64::MAX)),
         }
     }
 }
 
-/// A feature of a table and how it enters.
+/// Identifier and transform of a feature.
 type Feature = (&'static str, Transform);
 
-/// Features of nuclei that are looked at.
+/// Features of nuclei.
 const NUCLEI: [Feature; 25] = [
     ("nucleus area, um2", Transform::Log(0.0)),
-    ("core absorbance", Transform::Itself),
-    ("core above surroundings", Transform::Itself),
-    ("absorbance beside", Transform::Itself),
+    ("core absorbance", Transform::Identity),
+    ("core above surroundings", Transform::Identity),
+    ("absorbance beside", Transform::Identity),
     ("spread beside", Transform::Log(0.005)),
     ("core sd", Transform::Log(0.002)),
     ("core sd without trend", Transform::Log(0.002)),
     ("core sd over contrast", Transform::Log(0.01)),
     ("core slope", Transform::Log(0.002)),
-    ("core slope over sd", Transform::Itself),
-    ("rim to centre, bin 1 of 5", Transform::Itself),
-    ("rim to centre, bin 2 of 5", Transform::Itself),
-    ("rim to centre, bin 3 of 5", Transform::Itself),
-    ("rim to centre, bin 5 of 5", Transform::Itself),
+    ("core slope over sd", Transform::Identity),
+    ("rim to centre, bin 1 of 5", Transform::Identity),
+    ("rim to centre, bin 2 of 5", Transform::Identity),
+    ("rim to centre, bin 3 of 5", Transform::Identity),
+    ("rim to centre, bin 5 of 5", Transform::Identity),
     ("rim sigma, px", Transform::Log(0.0)),
-    ("darkest depth over core", Transform::Itself),
-    ("rim slope over contrast", Transform::Itself),
-    ("core correlation at 1 px", Transform::Itself),
-    ("core correlation at 2 px", Transform::Itself),
-    ("core correlation at 4 px", Transform::Itself),
+    ("darkest depth over core", Transform::Identity),
+    ("rim slope over contrast", Transform::Identity),
+    ("core correlation at 1 px", Transform::Identity),
+    ("core correlation at 2 px", Transform::Identity),
+    ("core correlation at 4 px", Transform::Identity),
     ("core power at 1 px", Transform::Log(0.001)),
     ("core power at 4 px", Transform::Log(0.001)),
-    ("log moment 2", Transform::Itself),
-    ("core skewness", Transform::Itself),
-    ("nucleus eccentricity", Transform::Itself),
+    ("log moment 2", Transform::Identity),
+    ("core skewness", Transform::Identity),
+    ("nucleus eccentricity", Transform::Identity),
 ];
 
-/// Features whose spread within windows and between them are told apart: where the field differs, all its nuclei do.
+/// Features of nuclei with separate standard deviations within windows and between windows.
 const NUCLEI_APART: [Feature; 5] = [
     ("core above surroundings", Transform::Log(0.02)),
     ("core sd over contrast", Transform::Log(0.01)),
@@ -68,11 +68,11 @@ const NUCLEI_APART: [Feature; 5] = [
     ("absorbance beside", Transform::Log(0.01)),
 ];
 
-/// The same of free cells.
+/// Features of free cells with separate standard deviations.
 const CELLS_APART: [Feature; 2] =
     [("cytoplasm absorbance", Transform::Log(0.005)), ("cell area, um2", Transform::Log(0.0))];
 
-/// Distances within which pairs of nuclei are counted over all windows, µm.
+/// Distances of counted pairs of nuclei, µm.
 const PAIRS_UM: [f64; 5] = [8.0, 16.0, 33.0, 66.0, 130.0];
 
 /// Features of free cells.
@@ -80,36 +80,36 @@ const CELLS: [Feature; 13] = [
     ("cell area, um2", Transform::Log(0.0)),
     ("cytoplasm absorbance", Transform::Log(0.005)),
     ("cytoplasm sd over median", Transform::Log(0.02)),
-    ("cytoplasm quantile 0.9 over median", Transform::Itself),
+    ("cytoplasm quantile 0.9 over median", Transform::Identity),
     ("cytoplasm power at 1 px over median", Transform::Log(0.002)),
     ("cytoplasm power at 2 px over median", Transform::Log(0.002)),
     ("cytoplasm power at 4 px over median", Transform::Log(0.002)),
     ("cytoplasm power at 8 px over median", Transform::Log(0.002)),
     ("cytoplasm slope over median", Transform::Log(0.002)),
-    ("dark spots in cytoplasm, um-2", Transform::Itself),
+    ("dark spots in cytoplasm, um-2", Transform::Identity),
     ("sigma of the cell's rim, px, quantile 0.25", Transform::Log(0.2)),
     ("nucleus over cell area", Transform::Log(0.001)),
-    ("cell circularity", Transform::Itself),
+    ("cell circularity", Transform::Identity),
 ];
 
-/// Parts of a window darker than these.
+/// Absorbances above which the fraction of the window is measured.
 const TAILS: [f64; 8] = [0.05, 0.09, 0.15, 0.21, 0.31, 0.41, 0.61, 0.81];
 
-/// Fewest nuclei, or cells, that have a middle.
+/// Minimum number of nuclei or cells for a median.
 const LEAST: usize = 4;
 
-/// What is measured in a window.
+/// Measurements of a window.
 #[derive(Debug, Clone)]
 pub(crate) struct Window {
-    /// Numbers of the window as a whole.
+    /// Statistics of the complete window.
     whole: Vec<(String, f64)>,
     nuclei: FeatureTable,
     cells: FeatureTable,
-    /// Pairs of nuclei within each of [`PAIRS_UM`], and how many as many nuclei thrown at random would make.
+    /// Pairs of nuclei within each of [`PAIRS_UM`], and the expected number for random positions.
     pairs: [[f64; 2]; PAIRS_UM.len()],
 }
 
-/// Numbers of the statistics of a window.
+/// Returns the scalars of the statistics of a window.
 fn scalars(s: &Statistics) -> Vec<(&'static str, f64)> {
     let ripley = s.ripley.map(|k| Transform::Log(0.1).of(k));
     vec![
@@ -119,8 +119,8 @@ fn scalars(s: &Statistics) -> Vec<(&'static str, f64)> {
         ("noise correlation diagonally", s.noise_diagonal),
         ("log coverage", Transform::Log(0.01).of(s.coverage)),
         ("log absorbance of what is covered", Transform::Log(0.005).of(s.covered_a)),
-        ("log range of it", Transform::Log(0.0).of(s.covered_range)),
-        ("log part of it in layers", Transform::Log(0.02).of(s.layered)),
+        ("log range of absorbance of what is covered", Transform::Log(0.0).of(s.covered_range)),
+        ("log fraction of overlaps", Transform::Log(0.02).of(s.layered)),
         ("slope of the spectrum", s.spectrum_slope),
         ("log edge sigma p10", Transform::Log(0.1).of(s.edge_sigma_p10)),
         ("log edge sigma p50", Transform::Log(0.1).of(s.edge_sigma_p50)),
@@ -136,41 +136,41 @@ fn scalars(s: &Statistics) -> Vec<(&'static str, f64)> {
     ]
 }
 
-/// Those of a window as a whole whose deviation between windows is looked at too.
-const SPREAD: [&str; 13] = [
+/// Statistics of the complete window with a standard deviation between windows.
+const WITH_SD: [&str; 13] = [
     "log noise",
     "log coverage",
     "log absorbance of what is covered",
-    "log range of it",
+    "log range of absorbance of what is covered",
     "log edge sigma p10",
     "log edge sigma p50",
     "log nuclei",
     "log power, ring 4",
     "log power, ring 9",
     "log power, ring 11",
-    "part above 0.15",
-    "part above 0.41",
-    "log part of it in layers",
+    "fraction above 0.15",
+    "fraction above 0.41",
+    "log fraction of overlaps",
 ];
 
 impl Window {
-    pub(crate) fn new(picture: &FieldImage, view: &WindowSampler, control: &Control) -> Result<Self, Error> {
-        let Field { statistics: s, nuclei, cells, .. } = view.measurer.measure_with(picture, control)?;
+    pub(crate) fn new(image: &FieldImage, view: &WindowSampler, control: &Control) -> Result<Self, Error> {
+        let Field { statistics: s, nuclei, cells, .. } = view.measurer.measure_with(image, control)?;
         control.check()?;
-        let (grey, width) = (&picture.grey, picture.width);
-        let empty = s.background_dn * f64::from(picture.full_scale) / crate::recipe::LEVELS;
+        let (grey, width) = (&image.grey, image.width);
+        let empty = s.background_dn * f64::from(image.full_scale) / crate::recipe::LEVELS;
         let [fine, coarse] = noise::unevenness(grey, width, empty);
         let named = |(name, value): (&str, f64)| (name.to_owned(), value);
         let mut whole: Vec<(String, f64)> = scalars(&s).into_iter().map(named).collect();
         whole.extend(s.spectrum.iter().enumerate().map(|(i, power)| (format!("log power, ring {i}"), *power)));
-        whole.extend(TAILS.map(|a| (format!("part above {a}"), Transform::Log(0.002).of(tail(&s.histogram, a)))));
-        let law = (1..).zip(noise::law(grey, width, empty));
-        whole.extend(law.map(|(i, noise)| (format!("noise in the dark, bin {i}"), noise)));
+        whole.extend(TAILS.map(|a| (format!("fraction above {a}"), Transform::Log(0.002).of(tail(&s.histogram, a)))));
+        let dark = (1..).zip(noise::noise_by_darkness(grey, width, empty));
+        whole.extend(dark.map(|(i, noise)| (format!("noise in the dark, bin {i}"), noise)));
         whole.push(("unevenness of the light, finely".to_owned(), fine));
         whole.push(("unevenness of the light, coarsely".to_owned(), coarse));
         control.check()?;
         whole.extend(noise::counts(grey, width, single(empty)));
-        let pairs = PAIRS_UM.map(|um| pairs(&nuclei.places, picture, um / view.pixel_um));
+        let pairs = PAIRS_UM.map(|um| pairs(&nuclei.places, image, um / view.pixel_um));
         Ok(Self { whole, nuclei, cells, pairs })
     }
 
@@ -190,8 +190,8 @@ impl Window {
     }
 }
 
-/// How many pairs of places are within a distance, and how many are to be expected.
-fn pairs(places: &[[f64; 2]], picture: &FieldImage, within_px: f64) -> [f64; 2] {
+/// Returns the number of pairs within a distance, and the expected number for random positions.
+fn pairs(places: &[[f64; 2]], image: &FieldImage, within_px: f64) -> [f64; 2] {
     let near = |a: &[f64; 2], b: &[f64; 2]| {
         let [x, y] = [a[0] - b[0], a[1] - b[1]];
         x * x + y * y <= within_px * within_px
@@ -199,30 +199,30 @@ fn pairs(places: &[[f64; 2]], picture: &FieldImage, within_px: f64) -> [f64; 2] 
     let found: usize =
         places.iter().enumerate().map(|(i, a)| places[i + 1..].iter().filter(|b| near(a, b)).count()).sum();
     let n = places.len() as f64;
-    let part = std::f64::consts::PI * within_px * within_px / picture.grey.len() as f64;
+    let part = std::f64::consts::PI * within_px * within_px / image.grey.len() as f64;
     [found as f64, 0.5 * n * (n - 1.0) * part]
 }
 
-/// Part of the histogram above an absorbance.
+/// Returns the fraction of the histogram above an absorbance.
 fn tail(histogram: &[f64], above: f64) -> f64 {
     let from = whole((above - papsynth_judge::HISTOGRAM_FROM) / papsynth_judge::HISTOGRAM_STEP + 0.5);
     histogram.iter().skip(from).sum()
 }
 
-/// What several windows of one microscope are like: named numbers, NaN where there is none.
+/// Statistics of several windows of one microscope; NaN if unknown.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Summary {
-    /// What they are.
+    /// Names of the statistics.
     pub names: Vec<String>,
-    /// The numbers.
+    /// Values of the statistics.
     pub values: Vec<f64>,
 }
 
 impl Summary {
-    /// Of windows of fields.
+    /// Measures windows of fields.
     ///
     /// # Errors
-    /// If a picture is none.
+    /// If an image is invalid.
     pub fn of(images: &[FieldImage], view: &WindowSampler) -> Result<Self, Error> {
         Ok(Self::new(&Window::all(images, view, &Control::NONE)?))
     }
@@ -232,18 +232,18 @@ impl Summary {
         for (i, (name, _)) in windows.first().into_iter().flat_map(|w| &w.whole).enumerate() {
             let known: Vec<f64> = windows.iter().map(|w| w.whole[i].1).filter(|v| v.is_finite()).collect();
             all.put(name.clone(), mean(&known));
-            if SPREAD.contains(&name.as_str()) {
+            if WITH_SD.contains(&name.as_str()) {
                 all.put(format!("{name}, sd"), Transform::Log(0.01).of(deviation(&known)));
             }
         }
         let nuclei: Vec<&FeatureTable> = windows.iter().map(|w| &w.nuclei).collect();
-        all.put_things("nuclei", &nuclei, &NUCLEI, &NUCLEI_APART);
+        all.put_objects("nuclei", &nuclei, &NUCLEI, &NUCLEI_APART);
         for (i, um) in PAIRS_UM.iter().enumerate() {
             let [found, expected] = [0, 1].map(|k| windows.iter().map(|w| w.pairs[i][k]).sum::<f64>());
             all.put(format!("pairs of nuclei within {um} um"), libm::log((found + 1.0) / (expected + 1.0)));
         }
         let cells: Vec<&FeatureTable> = windows.iter().map(|w| &w.cells).collect();
-        all.put_things("cells", &cells, &CELLS, &CELLS_APART);
+        all.put_objects("cells", &cells, &CELLS, &CELLS_APART);
         all
     }
 
@@ -252,14 +252,14 @@ impl Summary {
         self.values.push(value);
     }
 
-    /// Features of things of one kind: over all windows, and within windows and between them.
-    fn put_things(&mut self, kind: &str, tables: &[&FeatureTable], features: &[Feature], told_apart: &[Feature]) {
+    /// Adds features of objects of one kind: over all windows, and within and between windows.
+    fn put_objects(&mut self, kind: &str, tables: &[&FeatureTable], features: &[Feature], separate: &[Feature]) {
         for (name, scale) in features {
             let [middle, spread] = pooled(tables, name, *scale);
             self.put(format!("{kind}: {name}"), middle);
-            self.put(format!("{kind}: {name}, spread"), Transform::Log(0.003).of(spread));
+            self.put(format!("{kind}: {name}, sd"), Transform::Log(0.003).of(spread));
         }
-        for (name, scale) in told_apart {
+        for (name, scale) in separate {
             let [within, between] = apart(tables, name, *scale);
             self.put(format!("{kind}: {name}, within windows"), Transform::Log(0.01).of(within));
             self.put(format!("{kind}: {name}, between windows"), Transform::Log(0.02).of(between));
@@ -267,7 +267,7 @@ impl Summary {
     }
 }
 
-/// Middle and spread (three quarters of the distance between quartiles) of a feature over all tables.
+/// Returns median and robust standard deviation (0.741 times the interquartile range) of a feature over all tables.
 fn pooled(tables: &[&FeatureTable], name: &str, scale: Transform) -> [f64; 2] {
     let mut values: Vec<f64> = tables.iter().flat_map(|t| t.column(name)).map(|v| scale.of(v)).collect();
     if values.len() < LEAST {
@@ -277,7 +277,7 @@ fn pooled(tables: &[&FeatureTable], name: &str, scale: Transform) -> [f64; 2] {
     [middle, 0.741 * (high - low)]
 }
 
-/// Standard deviation within tables, and that of their means without what the former makes of it.
+/// Returns the standard deviation within tables, and that between their means, corrected for the variation within.
 fn apart(tables: &[&FeatureTable], name: &str, scale: Transform) -> [f64; 2] {
     let known = tables.iter().map(|t| t.column(name).map(|v| scale.of(v)).collect::<Vec<f64>>());
     let groups: Vec<Vec<f64>> = known.filter(|v| v.len() >= 2).collect();

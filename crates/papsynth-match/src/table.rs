@@ -57,7 +57,8 @@ pub struct Plan<'a> {
 }
 
 impl<'a> Plan<'a> {
-    /// Draws recipes from the ranges of all parameters that are found by simulation. `known` gives the other parameters.
+    /// Draws recipes from the ranges of all parameters that are found by simulation. `known` gives the other
+    /// parameters.
     ///
     /// # Errors
     /// If a parameter is out of range.
@@ -106,8 +107,8 @@ impl<'a> Plan<'a> {
         Ok(window)
     }
 
-    /// Simulates one recipe: the positions of the sought parameters in their ranges, and the statistics of its windows. Repeated
-    /// calls return the same values.
+    /// Simulates one recipe: the positions of the sought parameters in their ranges, and the statistics of its windows.
+    /// Repeated calls return the same values.
     ///
     /// # Errors
     /// If the recipe cannot be simulated.
@@ -149,7 +150,7 @@ impl<'a> Plan<'a> {
         /// Some combinations of parameters leave no space for all cells. More failures than this are an error.
         const MOST_FAILED: f64 = 0.2;
         if (recipes - made) as f64 > MOST_FAILED * recipes as f64 {
-            return Err(Error::SimulationTable { made, asked: recipes, reason: reason.unwrap_or_default() });
+            return Err(Error::Simulation { succeeded: made, total: recipes, reason: reason.unwrap_or_default() });
         }
         let names = rows.last().map(|row| row.1.names.clone()).unwrap_or_default();
         let (places, statistics) = rows.into_iter().map(|(places, summary)| (places, summary.values)).unzip();

@@ -1,4 +1,4 @@
-//! A recipe as TOML: what differs from the default, and what is known of each number.
+//! The matched recipe as TOML, with intervals as comments.
 
 use papsynth::recipe::{CellMix, RECIPE_VERSION, Recipe, is_toml_table, toml_value};
 use serde_json::Value;
@@ -6,11 +6,12 @@ use serde_json::Value;
 use crate::fit::{Fit, Origin, ParameterFit};
 use crate::recipe::rounded_to;
 
-/// Digits that values are told with.
+/// Significant digits of values in comments.
 const DIGITS: i32 = 3;
 
 impl Fit {
-    /// The recipe as TOML over the default one, with each parameter's value, interval and origin as comments.
+    /// Returns the recipe as TOML, without default values, and with value, interval and origin of each parameter as
+    /// comments.
     #[must_use]
     pub fn to_toml(&self) -> String {
         let json = |recipe: &Recipe| serde_json::to_value(recipe).unwrap_or_default();
@@ -30,20 +31,20 @@ impl Fit {
         );
         if self.extended {
             out.push_str(
-                "# The fields were fused of several planes: begun from the recipe as a scanner that fuses shows it.\n",
+                "# The fields are fused from several focal planes (EDF): the initial recipe is that of a fusing scanner.\n",
             );
         }
         let lost: Vec<&str> =
             self.parameters.iter().filter(|a| a.origin == Origin::NotIdentified).map(|a| a.path).collect();
         if !lost.is_empty() {
-            out.push_str("# The fields do not tell these, which are as in the recipe to begin with:\n");
+            out.push_str("# Not identified, with the values of the initial recipe:\n");
             lost.iter().for_each(|path| out.push_str(&format!("#   {path}\n")));
         }
         out.push('\n');
         out
     }
 
-    /// The fields of a table that differ from the default or were found, plain ones first.
+    /// Writes the fields of a table that are fitted or differ from the default: values first, then subtables.
     fn table(&self, out: &mut String, path: &str, value: &Value, default: &Value) {
         let Some(fields) = value.as_object() else { return };
         let other_kind = fields.get("kind") != default.get("kind");
@@ -69,23 +70,23 @@ impl Fit {
         }
         for (name, value) in tables {
             let inner = within(name);
-            // A class of cells that is named at all is read over the default of all classes.
+            // The default of a listed class is the default of all classes.
             let of_class = serde_json::to_value(CellMix::default()).unwrap_or_default();
             let default = if path == "cells" { &of_class } else { default.get(name).unwrap_or(&Value::Null) };
             self.table(out, &inner, value, default);
         }
     }
 
-    /// What is known of the parameters behind a field, as comments.
+    /// Returns comments about the parameters of a field.
     fn notes(&self, path: &str) -> String {
-        let told =
+        let fitted =
             self.parameters.iter().filter(|a| a.origin != Origin::NotIdentified && a.fields().any(|f| is_at(&f, path)));
-        told.map(|a| format!("# {}\n", a.note())).collect()
+        fitted.map(|a| format!("# {}\n", a.note())).collect()
     }
 }
 
 impl ParameterFit {
-    /// The fields of a recipe that it stands in, classes of cells as `*`.
+    /// Returns the recipe fields of the parameter, with `*` for a class of cells.
     fn fields(&self) -> impl Iterator<Item = String> + '_ {
         let (fields, _) = self.path.split_once(':').unwrap_or((self.path, ""));
         let section = fields.split('.').next().unwrap_or_default();
@@ -94,7 +95,7 @@ impl ParameterFit {
             .map(move |field| if field.contains('.') { field.to_owned() } else { format!("{section}.{field}") })
     }
 
-    /// What it says of them: "median".
+    /// Returns the number of the distribution: "median".
     fn what(&self) -> &str {
         self.path.split_once(": ").map_or("value", |(_, what)| what)
     }
@@ -111,9 +112,9 @@ impl ParameterFit {
     }
 }
 
-/// Whether a field with `*` for a class is a path.
+/// Returns whether a path matches a field with `*` for a class.
 fn is_at(field: &str, path: &str) -> bool {
-    // The paper's optics have another name for it.
+    // The Gaussian optics of the paper use another field.
     let path = path.replace("sigma_xy_um", "extra_blur_um");
     let (a, b) = (field.split('.'), path.split('.'));
     a.clone().count() == b.clone().count() && a.zip(b).all(|(a, b)| a == "*" || a == b)
@@ -128,7 +129,7 @@ mod tests {
     use papsynth::recipe::Preset;
 
     #[test]
-    fn what_is_written_is_read_as_the_recipe() {
+    fn the_written_recipe_is_read_back() {
         for preset in Preset::ALL {
             let setting = Setting {
                 base: preset.recipe(),

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use numpy::{Element, IntoPyArray, PyArrayDyn, PyArrayMethods};
 use papsynth::Plane;
-use papsynth::scene::{Kind, Tint};
+use papsynth::scene::{ObjectKind, Tint};
 use papsynth::truth::{Bounds, Group, Mask, ObjectTruth, Part, Truth, UnknownTrait};
 use papsynth_dataset::{Column, Problem, columns, rle, write_png};
 use pyo3::IntoPyObjectExt;
@@ -307,7 +307,19 @@ pub(crate) fn restored(
         return Err(damaged("array shapes do not match"));
     }
     let truth = restored_truth([width, height], planes_um.len(), objects)?;
-    Ok(Frame { seed, index, slide, pixel_um, planes_um, bits, image, stack, noise_free, truth, cache: Cache::default() })
+    Ok(Frame {
+        seed,
+        index,
+        slide,
+        pixel_um,
+        planes_um,
+        bits,
+        image,
+        stack,
+        noise_free,
+        truth,
+        cache: Cache::default(),
+    })
 }
 
 /// Returns a cached value, or computes and caches it.
@@ -399,7 +411,7 @@ fn restored_object(object: PickledObject, [width, height]: [usize; 2], planes: u
     Ok(ObjectTruth {
         id,
         part,
-        kind: Kind::ALL.into_iter().find(|one| one.name() == kind).ok_or_else(|| unknown("kind", &kind))?,
+        kind: ObjectKind::ALL.into_iter().find(|one| one.name() == kind).ok_or_else(|| unknown("kind", &kind))?,
         class,
         bethesda,
         traits: traits.try_into().map_err(|error: UnknownTrait| damaged(&format!("object {id}: {error}")))?,

@@ -33,7 +33,9 @@ fn drawn<'py, E: Display + Send>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let mut out = match rows.checked_mul(columns) {
         Some(pixels @ 1..=MAX_PIXELS) => vec![0.0; pixels],
-        _ => return Err(wrong(format!("shape: ({rows}, {columns}) is out of range: expected 1 to {MAX_PIXELS} pixels"))),
+        _ => {
+            return Err(wrong(format!("shape: ({rows}, {columns}) is out of range: expected 1 to {MAX_PIXELS} pixels")));
+        }
     };
     py.detach(|| draw(&mut out)).map_err(wrong)?;
     image(py, out, columns)
@@ -233,7 +235,7 @@ fn grow<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let outline = outline_of(&outline)?;
     drawn(py, shape, |out| -> Result<(), voronoi_cytoskeleton::Error> {
-        let params = voronoi_cytoskeleton::SkeletonParams { rivers, ..Default::default() };
+        let params = voronoi_cytoskeleton::SkeletonParams { paths: rivers, ..Default::default() };
         let rivers = voronoi_cytoskeleton::Skeleton::new(&params)?.grow(&outline, &mut random(seed))?;
         let lines = voronoi_cytoskeleton::LineParams { width_px, ..Default::default() };
         voronoi_cytoskeleton::draw_into(out, shape.1, &rivers, &lines)

@@ -7,7 +7,8 @@ use std::fs;
 use std::path::PathBuf;
 
 use papsynth_zarr::{
-    Channel, Form, Image, Kind, Labels, Pyramid, Sample, Space, Tiling, halved, halved_labels, shard_bytes,
+    Channel, Coordinates, DataType, Image, Labels, Pyramid, PyramidShape, Sample, Tiling, halved, halved_labels,
+    shard_bytes,
 };
 use serde_json::{Map, json};
 
@@ -15,19 +16,20 @@ use serde_json::{Map, json};
 const SIDE: usize = 1000;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let folder = PathBuf::from(std::env::args().nth(1).ok_or("the name of a folder is wanted")?);
+    let folder = PathBuf::from(std::env::args().nth(1).ok_or("usage: image FOLDER")?);
     let tiling = Tiling { chunk: 128, shard: 256, planes: 1 };
-    let form = Form { kind: Kind::U8, channels: None, planes: None, height: SIDE, width: SIDE, tiling, levels: 4 };
-    let form_of_labels = Form { kind: Kind::U16, ..form };
-    let from_middle = |i: usize| (i % SIDE).abs_diff(SIDE / 2).pow(2) + (i / SIDE).abs_diff(SIDE / 2).pow(2);
-    let pixels: Vec<u8> = (0..SIDE * SIDE).map(|i| (255 - from_middle(i) * 200 / (SIDE * SIDE)) as u8).collect();
-    let ids: Vec<u16> = (0..SIDE * SIDE).map(|i| if from_middle(i) < 90_000 { 7 } else { 0 }).collect();
+    let shape =
+        PyramidShape { kind: DataType::U8, channels: None, planes: None, height: SIDE, width: SIDE, tiling, levels: 4 };
+    let labels_form = PyramidShape { kind: DataType::U16, ..shape };
+    let squared_distance = |i: usize| (i % SIDE).abs_diff(SIDE / 2).pow(2) + (i / SIDE).abs_diff(SIDE / 2).pow(2);
+    let pixels: Vec<u8> = (0..SIDE * SIDE).map(|i| (255 - squared_distance(i) * 200 / (SIDE * SIDE)) as u8).collect();
+    let ids: Vec<u16> = (0..SIDE * SIDE).map(|i| if squared_distance(i) < 90_000 { 7 } else { 0 }).collect();
 
     let disc = Map::from_iter([("what".to_owned(), json!("disc"))]);
     let image = Image {
         name: "disc".to_owned(),
-        pyramid: Pyramid::new(&form)?,
-        space: Space { pixel_um: 0.25, step_um: 1.0, first_um: 0.0 },
+        pyramid: Pyramid::new(&shape)?,
+        coordinates: Coordinates { pixel_um: 0.25, step_um: 1.0, first_um: 0.0 },
         channels: vec![Channel {
             label: "grey".to_owned(),
             color: [255; 3],
@@ -37,7 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         plane: 0,
         labels: vec![Labels {
             name: "discs".to_owned(),
-            pyramid: Pyramid::new(&form_of_labels)?,
+            pyramid: Pyramid::new(&labels_form)?,
             colors: vec![(7, [0, 158, 115, 255])],
             properties: vec![(7, disc)],
         }],
@@ -50,7 +52,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     levels(&folder.join(image.labels[0].folder()), &image.labels[0].pyramid, ids, halved_labels)
 }
 
-/// Writes every shard of every level.
+/// Writes all shards of all levels.
 fn levels<T: Sample>(
     folder: &std::path::Path,
     pyramid: &Pyramid,
@@ -71,6 +73,6 @@ fn levels<T: Sample>(
 }
 
 fn write(path: &std::path::Path, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
-    fs::create_dir_all(path.parent().ok_or("a file lies in a folder")?)?;
+    fs::create_dir_all(path.parent().ok_or("the path has no folder")?)?;
     Ok(fs::write(path, bytes)?)
 }

@@ -1,106 +1,107 @@
-//! One array: how many numbers there are, and which file each lies in.
+//! Arrays: their shape, and the files of their shards.
 
 use std::ops::Range;
 
 use serde_json::{Value, json};
 
 use crate::error::{Error, argument};
-use crate::sample::Kind;
+use crate::sample::DataType;
 
-/// Level of zstd: noise hardly shrinks at any, and this one is fast.
+/// Compression level of zstd. Higher levels are slower and hardly improve the compression of noise.
 pub(crate) const ZSTD_LEVEL: i32 = 3;
 
-/// The place of a shard among those of its array, counted along z, y and x.
+/// Grid index of a shard in its array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Shard {
-    /// Along z.
+    /// Index along z.
     pub z: usize,
-    /// Downwards.
+    /// Index along y.
     pub y: usize,
-    /// To the right.
+    /// Index along x.
     pub x: usize,
 }
 
-/// The part of an array that a shard holds; at the border less than a shard could.
+/// The part of an array in a shard. It is smaller than the shard at the border of the array.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Block {
-    /// Planes of the array.
+    /// Range of planes in the array.
     pub planes: Range<usize>,
-    /// Rows of the array.
+    /// Range of rows in the array.
     pub rows: Range<usize>,
-    /// Columns of the array.
+    /// Range of columns in the array.
     pub columns: Range<usize>,
 }
 
 impl Block {
-    /// Pixels of one channel of one plane.
+    /// Returns the number of pixels of one channel of one plane.
     #[must_use]
     pub fn pixels(&self) -> usize {
         self.rows.len() * self.columns.len()
     }
 }
 
-/// One level of a [`Pyramid`](crate::Pyramid): an array of Zarr 3 in shards, each a file.
+/// One level of a [`Pyramid`](crate::Pyramid): a Zarr 3 array in shards. Each shard is a file.
 ///
-/// Chunks, which readers decompress one by one, are squares of one channel and plane. A shard holds the chunks of a square of all channels and of
-/// some planes; its file ends with an index and the checksum of that.
+/// A chunk, the unit of compression, is a square of one channel and plane. A shard has the chunks of a square of all
+/// channels and of some planes. Its file ends with an index and the checksum of the index.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Array {
-    pub(crate) kind: Kind,
+    pub(crate) kind: DataType,
     /// Whether there are axes c and z.
     pub(crate) has: [bool; 2],
     /// Channels, planes, rows, columns.
     pub(crate) shape: [usize; 4],
-    /// Side of a chunk.
+    /// Width and height of a chunk.
     pub(crate) chunk: usize,
-    /// Side of a shard.
+    /// Width and height of a shard.
     pub(crate) shard: usize,
-    /// Planes of a shard.
+    /// Number of planes of a shard.
     pub(crate) shard_planes: usize,
 }
 
 impl Array {
-    /// The type of its numbers.
+    /// Returns the data type.
     #[must_use]
-    pub fn kind(&self) -> Kind {
+    pub fn kind(&self) -> DataType {
         self.kind
     }
 
-    /// Channels, planes, rows and columns; 1 along an axis that it does not have.
+    /// Returns the number of channels, planes, rows and columns; 1 for a missing axis.
     #[must_use]
     pub fn shape(&self) -> [usize; 4] {
         self.shape
     }
 
-    /// Side of a chunk, px.
+    /// Returns the width and height of a chunk, px.
     #[must_use]
     pub fn chunk(&self) -> usize {
         self.chunk
     }
 
-    /// Side of a shard, px.
+    /// Returns the width and height of a shard, px.
     #[must_use]
     pub fn shard(&self) -> usize {
         self.shard
     }
 
-    /// Every shard, row by row and plane by plane: the files that must be there. Readers take a file that is missing for zeros.
+    /// Returns all shards, plane by plane in row-major order. All of their files must exist, because readers treat a
+    /// missing file as zeros.
     pub fn shards(&self) -> impl Iterator<Item = Shard> + use<> {
         let [_, planes, rows, columns] = self.shape;
         let [z, y, x] = [planes.div_ceil(self.shard_planes), rows.div_ceil(self.shard), columns.div_ceil(self.shard)];
         (0..z).flat_map(move |z| (0..y).flat_map(move |y| (0..x).map(move |x| Shard { z, y, x })))
     }
 
-    /// The shard that a pixel lies in, which must be in the array.
+    /// Returns the shard of a pixel. The pixel must be in the array.
     #[must_use]
     pub fn shard_of(&self, plane: usize, row: usize, column: usize) -> Shard {
         Shard { z: plane / self.shard_planes, y: row / self.shard, x: column / self.shard }
     }
 
-    /// What a shard holds.
+    /// Returns the part of the array in a shard.
     ///
     /// # Errors
-    /// If the array has no such shard.
+    /// If the shard is outside the array.
     pub fn block(&self, shard: Shard) -> Result<Block, Error> {
         let [_, planes, rows, columns] = self.shape;
         let part = |number: usize, side: usize, end: usize| {
@@ -113,19 +114,22 @@ impl Array {
             part(shard.x, self.shard, columns),
         ) {
             (Some(planes), Some(rows), Some(columns)) => Ok(Block { planes, rows, columns }),
-            _ => argument(format!("{shard:?} lies outside an array of {planes} x {rows} x {columns} pixels (z, y, x)")),
+            _ => argument(format!(
+                "the shard (z, y, x) = ({}, {}, {}) is outside the array of {planes} x {rows} x {columns} pixels",
+                shard.z, shard.y, shard.x
+            )),
         }
     }
 
-    /// The path of a shard's file from the folder of the array, such as `c/0/3/5`.
+    /// Returns the path of the file of a shard in the folder of the array, for example `c/0/3/5`.
     #[must_use]
     pub fn file(&self, shard: Shard) -> String {
-        // All channels lie in one.
+        // All channels are in the same shard.
         let numbers = self.of_axes([0, shard.z, shard.y, shard.x]);
         numbers.iter().fold("c".to_owned(), |path, number| format!("{path}/{number}"))
     }
 
-    /// The content of its `zarr.json`.
+    /// Returns the content of `zarr.json`.
     #[must_use]
     pub fn document(&self) -> Value {
         let [channels, ..] = self.shape;
@@ -140,7 +144,7 @@ impl Array {
                 "configuration": { "chunk_shape": self.of_axes([channels, self.shard_planes, self.shard, self.shard]) },
             },
             "chunk_key_encoding": { "name": "default", "configuration": { "separator": "/" } },
-            "fill_value": if self.kind == Kind::F32 { json!(0.0) } else { json!(0) },
+            "fill_value": if self.kind == DataType::F32 { json!(0.0) } else { json!(0) },
             "codecs": [{
                 "name": "sharding_indexed",
                 "configuration": {
@@ -158,28 +162,28 @@ impl Array {
         })
     }
 
-    /// Of values for c, z, y and x those of the axes that there are.
+    /// Selects from values for c, z, y and x those of the axes of the array.
     pub(crate) fn of_axes<T>(&self, values: [T; 4]) -> Vec<T> {
         let has = [self.has[0], self.has[1], true, true];
         values.into_iter().zip(has).filter_map(|(value, has)| has.then_some(value)).collect()
     }
 
-    /// Chunks along a side of a shard.
+    /// Number of chunks in a row of a shard.
     pub(crate) fn chunks(&self) -> usize {
         self.shard / self.chunk
     }
 
-    /// Entries of a shard's index.
+    /// Number of entries in the index of a shard.
     pub(crate) fn entries(&self) -> usize {
         self.shape[0] * self.shard_planes * self.chunks() * self.chunks()
     }
 
-    /// The entry of a chunk: its channel, and plane, row and column of chunks within the shard.
+    /// Returns the index entry of a chunk, from its channel, and its plane, row and column within the shard.
     pub(crate) fn entry(&self, channel: usize, plane: usize, row: usize, column: usize) -> usize {
         ((channel * self.shard_planes + plane) * self.chunks() + row) * self.chunks() + column
     }
 
-    /// Bytes of a chunk before it is compressed.
+    /// Size of an uncompressed chunk, bytes.
     pub(crate) fn chunk_bytes(&self) -> usize {
         self.chunk * self.chunk * self.kind.bytes()
     }

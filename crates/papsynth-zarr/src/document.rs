@@ -1,4 +1,4 @@
-//! What makes arrays an image: the documents of OME-NGFF.
+//! Metadata of OME-NGFF: the `zarr.json` documents of images and labels.
 
 use std::collections::BTreeSet;
 
@@ -7,73 +7,74 @@ use serde_json::{Map, Value, json};
 use crate::error::{Error, argument};
 use crate::pyramid::Pyramid;
 
-/// The version of OME-NGFF that is written.
+/// The version of OME-NGFF.
 pub const VERSION: &str = "0.5";
 
-/// Where pixels lie, in µm.
+/// Physical coordinates of the pixels, µm.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Space {
-    /// Side of a pixel of the full image.
+pub struct Coordinates {
+    /// Size of a pixel of the full image.
     pub pixel_um: f64,
-    /// From a plane to the next, below 0 if that lies lower; of no meaning without an axis z.
+    /// Distance from a plane to the next, negative for descending planes. Ignored without a z axis.
     pub step_um: f64,
-    /// Where the first plane lies.
+    /// Position of the first plane.
     pub first_um: f64,
 }
 
-/// How a viewer first shows a channel.
+/// Display settings of a channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
-    /// What it is called.
+    /// Name.
     pub label: String,
     /// Red, green and blue.
     pub color: [u8; 3],
-    /// The least and the largest value that there can be.
+    /// Smallest and largest possible value.
     pub range: [f64; 2],
-    /// The values shown as black and as white.
+    /// Values shown as black and as white.
     pub window: [f64; 2],
 }
 
-/// An image with its labels: a group of Zarr.
+/// An image with labels: a Zarr group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Image {
-    /// What it is called.
+    /// Name.
     pub name: String,
-    /// Its arrays, in the folders `0`, `1`, …
+    /// Arrays, in the folders `0`, `1`, …
     pub pyramid: Pyramid,
-    /// Where its pixels lie.
-    pub space: Space,
-    /// Its channels, in their order; one of an image without an axis c.
+    /// Physical coordinates of the pixels.
+    pub coordinates: Coordinates,
+    /// Channels in order; one for an image without a c axis.
     pub channels: Vec<Channel>,
-    /// The plane that a viewer first shows.
+    /// Index of the plane that a viewer shows first.
     pub plane: usize,
     /// Label images, in the folders `labels/NAME`.
     pub labels: Vec<Labels>,
-    /// Attributes beside those of OME.
+    /// Further attributes, besides those of OME.
     pub attributes: Map<String, Value>,
 }
 
-/// A label image: which object each pixel shows; 0 is none. Its pixels lie where those of its image do, as do their levels.
+/// A label image: the object of each pixel; 0 is background. Pixels and levels have the coordinates of those of the
+/// image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Labels {
-    /// What it is called: letters, digits, `-`, `_` and dots within.
+    /// Name of letters, digits, `-`, `_` and dots. The first character is not a dot.
     pub name: String,
-    /// Its arrays, as many as its image has, in the folders `0`, `1`, … of its own.
+    /// Arrays, in the folders `0`, `1`, … of the label image; as many as in the image.
     pub pyramid: Pyramid,
-    /// Colours of labels, as red, green, blue and opacity; of those that are not named a viewer chooses.
+    /// Colours of labels: red, green, blue and opacity. A viewer chooses the colours of other labels.
     pub colors: Vec<(u32, [u8; 4])>,
-    /// What is known of objects; a label may have several.
+    /// Properties of objects. A label may have several entries.
     pub properties: Vec<(u32, Map<String, Value>)>,
 }
 
 impl Labels {
-    /// The folder of the group, from that of the image.
+    /// Returns the folder of the label image in that of the image.
     #[must_use]
     pub fn folder(&self) -> String {
         format!("labels/{}", self.name)
     }
 
-    fn document(&self, space: &Space) -> Value {
+    fn document(&self, coordinates: &Coordinates) -> Value {
         let colors: Vec<Value> =
             self.colors.iter().map(|(label, rgba)| json!({ "label-value": label, "rgba": rgba })).collect();
         let properties = self.properties.iter().map(|(label, known)| {
@@ -91,24 +92,25 @@ impl Labels {
         label.insert("source".to_owned(), json!({ "image": "../../" }));
         group(&json!({
             "version": VERSION,
-            "multiscales": [multiscales(&self.name, &self.pyramid, space, "nearest")],
+            "multiscales": [multiscales(&self.name, &self.pyramid, coordinates, "nearest")],
             "image-label": label,
         }))
     }
 }
 
 impl Image {
-    /// Every `zarr.json` of the group, as its path from the group's folder and its content. With the shards of all arrays they are the whole image.
+    /// Returns all `zarr.json` of the group: the path in the folder of the group, and the content. With the shards of
+    /// all arrays they are the complete image.
     ///
     /// # Errors
-    /// If there are other channels than the image has, a label image has another size or another number of levels than the image or is not made of
-    /// integers, its name is none or another's, a pixel is not above 0 µm, or a step is 0.
+    /// If the number of channels is wrong, a label image differs from the image in size or number of levels or is not
+    /// of integers, a name is invalid or used twice, the pixel size is not above 0 µm, or the step is 0.
     pub fn documents(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
         self.check()?;
         let mut attributes = self.attributes.clone();
         let ome = json!({
             "version": VERSION,
-            "multiscales": [multiscales(&self.name, &self.pyramid, &self.space, "mean")],
+            "multiscales": [multiscales(&self.name, &self.pyramid, &self.coordinates, "mean")],
             "omero": self.omero(),
         });
         attributes.insert("ome".to_owned(), ome);
@@ -121,7 +123,7 @@ impl Image {
         }
         for labels in &self.labels {
             let folder = labels.folder();
-            documents.push((format!("{folder}/zarr.json"), labels.document(&self.space)));
+            documents.push((format!("{folder}/zarr.json"), labels.document(&self.coordinates)));
             documents.extend(arrays(&format!("{folder}/"), &labels.pyramid));
         }
         Ok(documents.into_iter().map(|(path, document)| (path, format!("{document:#}\n").into_bytes())).collect())
@@ -131,46 +133,50 @@ impl Image {
         let full = &self.pyramid.levels()[0];
         let [channels, planes, ..] = full.shape();
         if self.channels.len() != channels {
-            return argument(format!("channels: {} are described, the image has {channels}", self.channels.len()));
+            return argument(format!("channels: found {}; expected {channels}, as in the image", self.channels.len()));
         }
         if self.plane >= planes {
-            return argument(format!("plane: {} is not below {planes}", self.plane));
+            return argument(format!("plane: {} is out of range; expected less than {planes}", self.plane));
         }
-        let Space { pixel_um, step_um, first_um } = self.space;
+        let Coordinates { pixel_um, step_um, first_um } = self.coordinates;
         if !(pixel_um > 0.0 && pixel_um.is_finite()) {
-            return argument(format!("pixel_um: {pixel_um} is not above 0"));
+            return argument(format!("pixel_um: {pixel_um} is out of range; expected a number above 0"));
         }
         if full.has[1] && !(step_um != 0.0 && step_um.is_finite() && first_um.is_finite()) {
-            return argument(format!("step_um: {step_um} from {first_um} on does not lead to other planes"));
+            return argument(format!(
+                "step_um, first_um: found {step_um} and {first_um}; expected finite numbers, and a step other than 0"
+            ));
         }
         let mut names = BTreeSet::new();
         for Labels { name, pyramid, .. } in &self.labels {
             let is_fine = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
             if name.is_empty() || name.starts_with('.') || name == "zarr.json" || !name.chars().all(is_fine) {
                 let name = name.escape_default();
-                return argument(format!("labels: `{name}` is no name of letters, digits, `-`, `_` and dots within"));
+                return argument(format!(
+                    "labels: invalid name `{name}`; expected letters, digits, `-`, `_` and dots (not first)"
+                ));
             }
-            // Some systems do not tell small letters from large ones.
+            // File names may be case-insensitive.
             if !names.insert(name.to_lowercase()) {
-                return argument(format!("labels: `{name}` is there twice"));
+                return argument(format!("labels: the name `{name}` is used twice"));
             }
             if pyramid.levels().len() != self.pyramid.levels().len() {
                 let [found, due] = [pyramid, &self.pyramid].map(|pyramid| pyramid.levels().len());
-                return argument(format!("labels: `{name}` has {found} levels, its image {due}"));
+                return argument(format!("labels: `{name}` has {found} levels; expected {due}, as in the image"));
             }
             let [labels, image] = [&pyramid.levels()[0], full];
             if labels.shape()[2..] != image.shape()[2..] {
-                let message = "has another width or height than its image";
+                let message = "differs in width or height from the image";
                 return argument(format!("labels: `{name}` {message}"));
             }
-            if labels.kind() == crate::Kind::F32 {
-                return argument(format!("labels: `{name}` is of float32; accepted are integers"));
+            if labels.kind() == crate::DataType::F32 {
+                return argument(format!("labels: `{name}` has the type float32; expected integers"));
             }
         }
         Ok(())
     }
 
-    /// What viewers take contrast and names of channels from.
+    /// Returns the metadata with the names and display ranges of channels.
     fn omero(&self) -> Value {
         let hex = |color: [u8; 3]| color.iter().map(|part| format!("{part:02X}")).collect::<String>();
         let channels = self.channels.iter().map(|channel| {
@@ -197,25 +203,26 @@ fn group(ome: &Value) -> Value {
     json!({ "zarr_format": 3, "node_type": "group", "attributes": { "ome": ome } })
 }
 
-/// The documents of the arrays of a pyramid.
+/// Returns the documents of the arrays of a pyramid.
 fn arrays<'a>(folder: &'a str, pyramid: &'a Pyramid) -> impl Iterator<Item = (String, Value)> + 'a {
     let numbered = pyramid.levels().iter().enumerate();
     numbered.map(move |(number, array)| (format!("{folder}{number}/zarr.json"), array.document()))
 }
 
-/// Axes, and where the pixels of each level lie: the middle of a pixel is that of those it stands for.
-fn multiscales(name: &str, pyramid: &Pyramid, space: &Space, how: &str) -> Value {
+/// Returns the axes and the coordinates of each level. The centre of a pixel is that of the full-size pixels that it
+/// covers.
+fn multiscales(name: &str, pyramid: &Pyramid, coordinates: &Coordinates, how: &str) -> Value {
     let full = &pyramid.levels()[0];
     let micrometre = |name: &str| json!({ "name": name, "type": "space", "unit": "micrometer" });
     let axes = [json!({ "name": "c", "type": "channel" }), micrometre("z"), micrometre("y"), micrometre("x")];
     let datasets = (0_u32..).zip(pyramid.levels()).map(|(number, array)| {
         let factor = f64::from(1_u32 << number);
-        let (side, middle) = (space.pixel_um * factor, space.pixel_um * (factor - 1.0) / 2.0);
+        let (size, centre) = (coordinates.pixel_um * factor, coordinates.pixel_um * (factor - 1.0) / 2.0);
         json!({
             "path": number.to_string(),
             "coordinateTransformations": [
-                { "type": "scale", "scale": array.of_axes([1.0, space.step_um, side, side]) },
-                { "type": "translation", "translation": array.of_axes([0.0, space.first_um, middle, middle]) },
+                { "type": "scale", "scale": array.of_axes([1.0, coordinates.step_um, size, size]) },
+                { "type": "translation", "translation": array.of_axes([0.0, coordinates.first_um, centre, centre]) },
             ],
         })
     });
@@ -230,32 +237,32 @@ fn multiscales(name: &str, pyramid: &Pyramid, space: &Space, how: &str) -> Value
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pyramid::{Form, Tiling};
-    use crate::sample::Kind;
+    use crate::pyramid::{PyramidShape, Tiling};
+    use crate::sample::DataType;
 
-    fn form(kind: Kind) -> Form {
+    fn shape(kind: DataType) -> PyramidShape {
         let tiling = Tiling { chunk: 16, shard: 32, planes: 1 };
-        Form { kind, channels: None, planes: None, height: 50, width: 70, tiling, levels: 3 }
+        PyramidShape { kind, channels: None, planes: None, height: 50, width: 70, tiling, levels: 3 }
     }
 
     fn labels(name: &str) -> Labels {
         let known = Map::from_iter([("class".to_owned(), json!("superficial"))]);
         Labels {
             name: name.to_owned(),
-            pyramid: Pyramid::new(&form(Kind::U32)).unwrap(),
+            pyramid: Pyramid::new(&shape(DataType::U32)).unwrap(),
             colors: vec![(7, [1, 2, 3, 255])],
             properties: vec![(7, known)],
         }
     }
 
     fn image() -> Image {
-        let form = Form { channels: Some(1), planes: Some(4), ..form(Kind::U16) };
+        let shape = PyramidShape { channels: Some(1), planes: Some(4), ..shape(DataType::U16) };
         let channel =
             Channel { label: "grey".to_owned(), color: [255; 3], range: [0.0, 4095.0], window: [10.0, 4000.0] };
         Image {
             name: "000007".to_owned(),
-            pyramid: Pyramid::new(&form).unwrap(),
-            space: Space { pixel_um: 0.25, step_um: 0.5, first_um: -1.0 },
+            pyramid: Pyramid::new(&shape).unwrap(),
+            coordinates: Coordinates { pixel_um: 0.25, step_um: 0.5, first_um: -1.0 },
             channels: vec![channel],
             plane: 2,
             labels: vec![labels("nucleus-0"), labels("nucleus-1")],
@@ -270,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn there_is_a_document_for_every_group_and_array() {
+    fn every_group_and_array_has_a_document() {
         let paths: Vec<String> = image().documents().unwrap().into_iter().map(|(path, _)| path).collect();
         let of = |folder: &str| ["", "0/", "1/", "2/"].map(|level| format!("{folder}{level}zarr.json")).to_vec();
         let labels = "labels/zarr.json".to_owned();
@@ -281,14 +288,14 @@ mod tests {
     }
 
     #[test]
-    fn pixels_of_every_level_lie_over_those_they_stand_for() {
+    fn pixels_of_all_levels_are_aligned() {
         let ome = document(&image(), "zarr.json")["attributes"]["ome"].clone();
         let scales = &ome["multiscales"][0];
         let names: Vec<&str> = scales["axes"].as_array().unwrap().iter().map(|a| a["name"].as_str().unwrap()).collect();
         assert_eq!(names, ["c", "z", "y", "x"]);
         let transforms = &scales["datasets"][2]["coordinateTransformations"];
         assert_eq!(transforms[0]["scale"], json!([1.0, 0.5, 1.0, 1.0]));
-        // The first of four pixels of 0.25 µm has its middle at 0, the last at 0.75.
+        // The centres of four pixels of 0.25 µm are at 0 to 0.75 µm.
         assert_eq!(transforms[1]["translation"], json!([0.0, -1.0, 0.375, 0.375]));
         assert_eq!(ome["omero"]["channels"][0]["window"]["end"], 4000.0);
         let label = document(&image(), "labels/nucleus-1/zarr.json")["attributes"]["ome"].clone();
@@ -301,26 +308,26 @@ mod tests {
     }
 
     #[test]
-    fn what_no_reader_would_take_is_refused() {
+    fn invalid_images_are_refused() {
         let with = |change: fn(&mut Image)| {
             let mut image = image();
             change(&mut image);
             image.documents().unwrap_err().to_string()
         };
-        assert!(with(|image| image.channels.clear()).starts_with("channels: 0 are described"));
+        assert!(with(|image| image.channels.clear()).starts_with("channels: found 0"));
         assert!(with(|image| image.plane = 4).starts_with("plane: 4"));
-        assert!(with(|image| image.space.pixel_um = f64::NAN).starts_with("pixel_um"));
-        assert!(with(|image| image.space.step_um = 0.0).starts_with("step_um"));
-        assert!(with(|image| image.labels[1].name = "../up".to_owned()).contains("`../up` is no name"));
+        assert!(with(|image| image.coordinates.pixel_um = f64::NAN).starts_with("pixel_um"));
+        assert!(with(|image| image.coordinates.step_um = 0.0).starts_with("step_um"));
+        assert!(with(|image| image.labels[1].name = "../up".to_owned()).contains("invalid name `../up`"));
         assert!(with(|image| image.labels[1].name = "NUCLEUS-0".to_owned()).contains("twice"));
-        let pyramid = |change: fn(&mut Form)| {
-            let mut form = form(Kind::U32);
-            change(&mut form);
-            let labels = Labels { pyramid: Pyramid::new(&form).unwrap(), ..labels("nucleus-0") };
+        let pyramid = |change: fn(&mut PyramidShape)| {
+            let mut shape = shape(DataType::U32);
+            change(&mut shape);
+            let labels = Labels { pyramid: Pyramid::new(&shape).unwrap(), ..labels("nucleus-0") };
             Image { labels: vec![labels], ..image() }.documents().unwrap_err().to_string()
         };
-        assert!(pyramid(|form| form.levels = 2).contains("has 2 levels, its image 3"));
-        assert!(pyramid(|form| form.width = 71).contains("another width"));
-        assert!(pyramid(|form| form.kind = Kind::F32).contains("float32"));
+        assert!(pyramid(|shape| shape.levels = 2).contains("has 2 levels; expected 3"));
+        assert!(pyramid(|shape| shape.width = 71).contains("differs in width"));
+        assert!(pyramid(|shape| shape.kind = DataType::F32).contains("float32"));
     }
 }

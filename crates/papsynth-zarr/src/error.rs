@@ -1,24 +1,24 @@
-//! What can go wrong.
+//! Errors.
 
 use std::io;
 
-/// Why something cannot be described, written or read.
+/// Errors of this crate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// What was asked for makes no sense.
+    /// An argument is invalid.
     #[error("{what}")]
     Argument {
-        /// What it is, and what would be accepted.
+        /// The argument, its value, and the accepted values.
         what: String,
     },
-    /// A file is not as its array says: it was cut, changed, or is another's.
+    /// The file of a shard does not match its array: it was truncated or changed, or belongs to another array.
     #[error("the shard is damaged: {what}")]
     Damaged {
-        /// What is wrong with it.
+        /// Description of the damage.
         what: String,
     },
-    /// The system refused to read, or there is no memory for the compressor.
+    /// A file cannot be read, or the compressor has no memory.
     #[error(transparent)]
     Io(#[from] io::Error),
 }

@@ -10,9 +10,9 @@ mod sample;
 mod shard;
 
 pub use array::{Array, Block, Shard};
-pub use document::{Channel, Image, Labels, Space, VERSION};
+pub use document::{Channel, Coordinates, Image, Labels, VERSION};
 pub use error::Error;
-pub use pyramid::{Form, Pyramid, Tiling, levels_until};
+pub use pyramid::{Pyramid, PyramidShape, Tiling, levels_until};
 pub use read::ShardReader;
-pub use sample::{Kind, Sample, halved, halved_labels};
+pub use sample::{DataType, Sample, halved, halved_labels};
 pub use shard::{ShardEncoder, shard_bytes};

@@ -1,41 +1,41 @@
-//! An image at its own size, at half of it, and so on.
+//! Pyramids: an image at full size, half size, and so on.
 
 use crate::array::Array;
 use crate::error::{Error, argument};
-use crate::sample::Kind;
+use crate::sample::DataType;
 
 /// Largest width and height.
 const MAX_SIDE: usize = 1 << 31;
 
-/// Largest side of a chunk.
+/// Largest width and height of a chunk.
 const MAX_CHUNK: usize = 1 << 12;
 
-/// Most levels.
+/// Largest number of levels.
 const MAX_LEVELS: usize = 32;
 
-/// Most chunks of a shard: an index of 64 MiB.
+/// Largest number of chunks of a shard, with an index of 64 MiB.
 const MAX_ENTRIES: usize = 1 << 22;
 
-/// How an image is cut into chunks and files.
+/// Sizes of chunks and shards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Tiling {
-    /// Side of a chunk, what a viewer reads at least, px: 1 to 4096.
+    /// Width and height of a chunk, the smallest unit that a viewer reads, px: 1 to 4096.
     pub chunk: usize,
-    /// Side of a shard of the full image, px: the chunk, or twice, four times, … as much.
+    /// Width and height of a shard of the full image, px: the chunk times a power of two.
     pub shard: usize,
-    /// Planes of a shard, at least 1; of no meaning without an axis of them.
+    /// Number of planes of a shard, at least 1. Ignored without a z axis.
     pub planes: usize,
 }
 
 impl Default for Tiling {
-    /// Chunks of 512 pixels, shards of 4096, each plane by itself.
+    /// Chunks of 512 pixels, shards of 4096 pixels and one plane.
     fn default() -> Self {
         Self { chunk: 512, shard: 4096, planes: 1 }
     }
 }
 
 impl Tiling {
-    /// One file for a whole image: shards of this chunk and as many planes, large enough for width and height.
+    /// Returns a tiling with one shard for the complete image.
     #[must_use]
     pub fn whole(chunk: usize, planes: usize, width: usize, height: usize) -> Self {
         let mut shard = chunk.max(1);
@@ -46,26 +46,26 @@ impl Tiling {
     }
 }
 
-/// What an image is like.
+/// Shape, data type and tiling of an image and its levels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Form {
-    /// Type of its numbers.
-    pub kind: Kind,
-    /// Channels, if there is an axis of them.
+pub struct PyramidShape {
+    /// Data type.
+    pub kind: DataType,
+    /// Number of channels, or `None` for no c axis.
     pub channels: Option<usize>,
-    /// Planes, if there is an axis of them.
+    /// Number of planes, or `None` for no z axis.
     pub planes: Option<usize>,
     /// Rows.
     pub height: usize,
     /// Columns.
     pub width: usize,
-    /// How it is cut.
+    /// Sizes of chunks and shards.
     pub tiling: Tiling,
-    /// Levels, the full image being one: 1 to 32.
+    /// Number of levels with that of the full image: 1 to 32.
     pub levels: usize,
 }
 
-/// Levels until the longer side is at most `side` pixels.
+/// Returns the number of levels until width and height are at most `side` pixels.
 #[must_use]
 pub fn levels_until(side: usize, width: usize, height: usize) -> usize {
     let mut longer = width.max(height);
@@ -77,12 +77,12 @@ pub fn levels_until(side: usize, width: usize, height: usize) -> usize {
     levels
 }
 
-/// An image at several sizes, each half of that before, rounded up.
+/// An image at several sizes. Each is half of the previous one, rounded up.
 ///
-/// The shards of the first [`with_shard`](Self::with_shard) levels cover the same places: as the shard of the image is halved, so is the side of
-/// those of the next levels, down to one chunk. So whoever makes a shard of the image makes the files of these levels with it, from nothing but
-/// that shard, and no two write one file. Of the levels above, each shard is as large as one of the image, and is made later, of
-/// the four below it.
+/// The shards of the first [`with_shard`](Self::with_shard) levels cover the same regions: their width is halved from
+/// level to level, down to one chunk. The process that writes a shard of the image also writes the files of these
+/// levels, from this shard alone, and no two processes write the same file. In the levels above, shards have the full
+/// width. They are written later, each from four shards below.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pyramid {
     levels: Vec<Array>,
@@ -90,14 +90,14 @@ pub struct Pyramid {
 }
 
 impl Pyramid {
-    /// The levels of an image.
+    /// Creates the levels of an image.
     ///
     /// # Errors
-    /// If there is no pixel, or a size is out of its range.
-    pub fn new(form: &Form) -> Result<Self, Error> {
-        let Form { kind, channels, planes, height, width, tiling, levels } = *form;
+    /// If a size is 0 or out of range.
+    pub fn new(pyramid_shape: &PyramidShape) -> Result<Self, Error> {
+        let PyramidShape { kind, channels, planes, height, width, tiling, levels } = *pyramid_shape;
         let Tiling { chunk, shard, planes: shard_planes } = tiling;
-        // Where there is no axis of planes, none can be cut.
+        // Ignored without a z axis.
         let shard_planes = if planes.is_some() { shard_planes } else { 1 };
         let shape = [channels.unwrap_or(1), planes.unwrap_or(1), height, width];
         for (name, size, most) in [
@@ -111,18 +111,16 @@ impl Pyramid {
             ("levels", levels, MAX_LEVELS),
         ] {
             if !(1..=most).contains(&size) {
-                return argument(format!("{name}: {size} is not within 1 to {most}"));
+                return argument(format!("{name}: {size} is out of range: expected 1 to {most}"));
             }
         }
         if shard % chunk != 0 || !(shard / chunk).is_power_of_two() {
-            return argument(format!("shard: {shard} is not {chunk} (the chunk) times a power of two"));
+            return argument(format!("shard: found {shard}; expected the chunk ({chunk}) times a power of two"));
         }
         let along = shard / chunk;
         let entries = [shape[0], shard_planes, along, along].into_iter().try_fold(1_usize, usize::checked_mul);
         if entries.is_none_or(|entries| entries > MAX_ENTRIES) {
-            return argument(format!(
-                "shard: it would have more than {MAX_ENTRIES} chunks; take larger chunks or smaller shards"
-            ));
+            return argument(format!("shard: more than {MAX_ENTRIES} chunks; use larger chunks or smaller shards"));
         }
         let local = along.ilog2() as usize + 1;
         let level = |level: usize| {
@@ -139,13 +137,13 @@ impl Pyramid {
         Ok(Self { levels: (0..levels).map(level).collect(), with_shard: local.min(levels) })
     }
 
-    /// Its levels, the full image first.
+    /// Returns the levels, the full image first.
     #[must_use]
     pub fn levels(&self) -> &[Array] {
         &self.levels
     }
 
-    /// The number of levels whose shard is made with that of the image.
+    /// Returns the number of levels whose shards cover the same regions as those of the image.
     #[must_use]
     pub fn with_shard(&self) -> usize {
         self.with_shard
@@ -157,9 +155,9 @@ mod tests {
     use super::*;
     use crate::array::Shard;
 
-    fn slide() -> Form {
-        Form {
-            kind: Kind::U8,
+    fn slide() -> PyramidShape {
+        PyramidShape {
+            kind: DataType::U8,
             channels: None,
             planes: None,
             height: 100_000,
@@ -170,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn shards_of_lower_levels_cover_the_same_places() {
+    fn shards_of_lower_levels_cover_the_same_regions() {
         let pyramid = Pyramid::new(&slide()).unwrap();
         assert_eq!(pyramid.with_shard(), 4);
         let full: Vec<Shard> = pyramid.levels()[0].shards().collect();
@@ -183,16 +181,18 @@ mod tests {
                 assert_eq!((half.rows, half.columns), (scaled(whole.rows), scaled(whole.columns)));
             }
         }
-        // Above, four shards make one.
+        // Above, a shard covers four below.
         let sides: Vec<usize> = pyramid.levels().iter().map(Array::shard).collect();
         assert_eq!(sides, [4096, 2048, 1024, 512, 4096, 4096, 4096, 4096, 4096]);
         assert_eq!(pyramid.levels()[8].shape(), [1, 1, 391, 352]);
     }
 
     #[test]
-    fn every_pixel_lies_in_the_one_shard_that_says_so() {
-        let form = Form { planes: Some(5), channels: Some(3), height: 70, width: 33, levels: 3, ..slide() };
-        let pyramid = Pyramid::new(&Form { tiling: Tiling { chunk: 8, shard: 16, planes: 2 }, ..form }).unwrap();
+    fn every_pixel_is_in_exactly_one_shard() {
+        let pyramid_shape =
+            PyramidShape { planes: Some(5), channels: Some(3), height: 70, width: 33, levels: 3, ..slide() };
+        let pyramid =
+            Pyramid::new(&PyramidShape { tiling: Tiling { chunk: 8, shard: 16, planes: 2 }, ..pyramid_shape }).unwrap();
         for level in pyramid.levels() {
             let [_, planes, rows, columns] = level.shape();
             let mut seen = vec![0; planes * rows * columns];
@@ -214,22 +214,22 @@ mod tests {
     }
 
     #[test]
-    fn sizes_out_of_range_are_refused_by_name() {
-        let with = |change: fn(&mut Form)| {
-            let mut form = slide();
-            change(&mut form);
-            Pyramid::new(&form).unwrap_err().to_string()
+    fn sizes_out_of_range_are_named_in_errors() {
+        let with = |change: fn(&mut PyramidShape)| {
+            let mut pyramid_shape = slide();
+            change(&mut pyramid_shape);
+            Pyramid::new(&pyramid_shape).unwrap_err().to_string()
         };
-        assert_eq!(with(|f| f.width = 0), "width: 0 is not within 1 to 2147483648");
-        assert_eq!(with(|f| f.levels = 33), "levels: 33 is not within 1 to 32");
-        assert_eq!(with(|f| f.tiling.shard = 1536), "shard: 1536 is not 512 (the chunk) times a power of two");
-        assert_eq!(with(|f| f.channels = Some(0)), "channels: 0 is not within 1 to 4194304");
+        assert_eq!(with(|f| f.width = 0), "width: 0 is out of range: expected 1 to 2147483648");
+        assert_eq!(with(|f| f.levels = 33), "levels: 33 is out of range: expected 1 to 32");
+        assert_eq!(with(|f| f.tiling.shard = 1536), "shard: found 1536; expected the chunk (512) times a power of two");
+        assert_eq!(with(|f| f.channels = Some(0)), "channels: 0 is out of range: expected 1 to 4194304");
         assert!(with(|f| f.tiling = Tiling { chunk: 1, shard: 1 << 20, planes: 1 }).contains("4194304 chunks"));
         assert!(with(|f| (f.planes, f.tiling.planes) = (Some(1), usize::MAX)).contains("planes of a shard"));
     }
 
     #[test]
-    fn one_shard_is_enough_for_a_whole_image() {
+    fn a_tiling_can_have_one_shard_for_the_complete_image() {
         assert_eq!(Tiling::whole(512, 3, 1376, 1038), Tiling { chunk: 512, shard: 2048, planes: 3 });
         assert_eq!(Tiling::whole(512, 1, 100, 3), Tiling { chunk: 512, shard: 512, planes: 1 });
         assert_eq!([levels_until(512, 1376, 1038), levels_until(512, 512, 1), levels_until(512, 513, 1)], [3, 1, 2]);

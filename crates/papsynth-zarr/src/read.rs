@@ -1,4 +1,4 @@
-//! A shard read back from its file.
+//! Reading shards.
 
 use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
@@ -10,16 +10,16 @@ use crate::error::{Error, argument, damaged};
 use crate::sample::Sample;
 use crate::shard::ABSENT;
 
-/// Bytes of an entry of the index.
+/// Size of an index entry, bytes.
 const ENTRY: usize = 16;
 
-/// Bytes of the checksum.
+/// Size of the checksum, bytes.
 const CHECKSUM: usize = 4;
 
 /// Reads regions of a shard that [`ShardEncoder`](crate::ShardEncoder) wrote.
 ///
-/// Whatever the file holds, no more memory is taken than the array's sizes ask for: the index, one chunk, and the region. What is not as it was
-/// written is an [`Error::Damaged`]: the index has a checksum, each chunk another, and none may be missing.
+/// Memory is limited by the sizes of the array, for any file: the index, one chunk, and the region. Any change of the
+/// file is an [`Error::Damaged`]: the index and each chunk have a checksum, and all chunks must exist.
 #[derive(Debug)]
 pub struct ShardReader<R> {
     array: Array,
@@ -32,20 +32,20 @@ impl<R: Read + Seek> ShardReader<R> {
     /// Opens the file of a shard and reads its index.
     ///
     /// # Errors
-    /// If the array has no such shard, the file is damaged, or the system refuses.
+    /// If the shard is outside the array, or the file is damaged or cannot be read.
     pub fn open(array: &Array, shard: Shard, mut file: R) -> Result<Self, Error> {
         let block = array.block(shard)?;
         let size = array.entries() * ENTRY + CHECKSUM;
         let length = file.seek(SeekFrom::End(0))?;
         let Some(data) = length.checked_sub(size as u64) else {
-            return damaged(format!("it has {length} bytes, its index alone {size}"));
+            return damaged(format!("the file has {length} bytes; expected at least {size} for the index"));
         };
         file.seek(SeekFrom::Start(data))?;
         let mut bytes = vec![0; size];
         file.read_exact(&mut bytes)?;
         let (entries, checksum) = bytes.split_at(size - CHECKSUM);
         if crc32c::crc32c(entries).to_le_bytes() != checksum {
-            return damaged("the checksum of its index is another".to_owned());
+            return damaged("the checksum of the index is wrong".to_owned());
         }
         let number = |bytes: &[u8]| bytes.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
         let index: Vec<[u64; 2]> =
@@ -55,7 +55,7 @@ impl<R: Read + Seek> ShardReader<R> {
         Ok(reader)
     }
 
-    /// Exactly the chunks of the array are there, and they fill the file.
+    /// Checks that the file has exactly the chunks of the array, and no other bytes.
     fn check(&self, data: u64) -> Result<(), Error> {
         let (array, block) = (&self.array, &self.block);
         let [rows, columns] = [block.rows.len(), block.columns.len()].map(|side| side.div_ceil(array.chunk));
@@ -66,7 +66,7 @@ impl<R: Read + Seek> ShardReader<R> {
             let (row, plane) = (rest % array.chunks(), rest / array.chunks() % array.shard_planes);
             let is_due = column < columns && row < rows && plane < block.planes.len();
             if is_due == ([start, bytes] == ABSENT) {
-                let what = if is_due { "is missing" } else { "lies outside the array" };
+                let what = if is_due { "is missing" } else { "is outside the array" };
                 return damaged(format!("chunk {number} {what}"));
             }
             if !is_due {
@@ -74,28 +74,30 @@ impl<R: Read + Seek> ShardReader<R> {
             }
             if start.checked_add(bytes).is_none_or(|end| end > data) || bytes > most {
                 return damaged(format!(
-                    "chunk {number} is said to have {bytes} bytes from {start} on, of {data} in all"
+                    "chunk {number} has {bytes} bytes at {start} in the index; the file has {data}"
                 ));
             }
             match left.checked_sub(bytes) {
                 Some(rest) => left = rest,
-                None => return damaged("its chunks have more bytes than it".to_owned()),
+                None => return damaged("the chunks have more bytes than the file".to_owned()),
             }
         }
-        if left == 0 { Ok(()) } else { damaged(format!("{left} of its bytes belong to no chunk")) }
+        if left == 0 { Ok(()) } else { damaged(format!("{left} bytes do not belong to a chunk")) }
     }
 
-    /// What the shard holds.
+    /// Returns the part of the array in the shard.
     #[must_use]
     pub fn block(&self) -> &Block {
         &self.block
     }
 
-    /// Rows and columns of one channel of one plane, all counted in the array and within the [`Block`], row by row. Every chunk that they touch is
-    /// decompressed: regions whose borders are those of chunks cost least.
+    /// Reads rows and columns of one channel of one plane, in row-major order. All indices are those of the array and
+    /// must be in the [`Block`]. All chunks of the region are decompressed, so regions along chunk borders are the
+    /// fastest.
     ///
     /// # Errors
-    /// If the region leaves the shard or the numbers are of another type than the array's, the file is damaged, or the system refuses.
+    /// If the region is not in the shard, `T` differs from the data type of the array, or the file is damaged or cannot
+    /// be read.
     pub fn region<T: Sample>(
         &mut self,
         channel: usize,
@@ -105,7 +107,7 @@ impl<R: Read + Seek> ShardReader<R> {
     ) -> Result<Vec<T>, Error> {
         let (array, block) = (&self.array, &self.block);
         if T::KIND != array.kind {
-            return argument(format!("{} from an array of {}", T::KIND.name(), array.kind.name()));
+            return argument(format!("cannot read {} from an array of {}", T::KIND.name(), array.kind.name()));
         }
         let inside = |part: &Range<usize>, whole: &Range<usize>| {
             part.start < part.end && whole.start <= part.start && part.end <= whole.end
@@ -113,11 +115,13 @@ impl<R: Read + Seek> ShardReader<R> {
         let fits = inside(&rows, &block.rows) && inside(&columns, &block.columns);
         if !fits || !block.planes.contains(&plane) || channel >= array.shape[0] {
             return argument(format!(
-                "rows {rows:?} and columns {columns:?} of channel {channel} of plane {plane} do not lie in {block:?}"
+                "rows {rows:?} and columns {columns:?} of channel {channel}, plane {plane} are not in the shard: planes {:?}, rows {:?}, \
+                 columns {:?}",
+                block.planes, block.rows, block.columns
             ));
         }
         let (side, size) = (array.chunk, array.kind.bytes());
-        // From here on counted in the shard.
+        // From here on, indices within the shard.
         let within = plane - block.planes.start;
         let [rows, columns] = [(&rows, &block.rows), (&columns, &block.columns)]
             .map(|(part, whole)| part.start - whole.start..part.end - whole.start);
@@ -142,27 +146,27 @@ impl<R: Read + Seek> ShardReader<R> {
         Ok(values)
     }
 
-    /// All of one channel of one plane.
+    /// Reads one channel of one plane.
     ///
     /// # Errors
-    /// As [`region`](Self::region).
+    /// See [`region`](Self::region).
     pub fn plane<T: Sample>(&mut self, channel: usize, plane: usize) -> Result<Vec<T>, Error> {
         let Block { rows, columns, .. } = self.block.clone();
         self.region(channel, plane, rows, columns)
     }
 
-    /// A chunk as it was before it was compressed.
+    /// Reads and decompresses a chunk.
     fn chunk(&mut self, entry: usize) -> Result<Vec<u8>, Error> {
         let [start, bytes] = self.index[entry];
         self.file.seek(SeekFrom::Start(start))?;
         let mut packed = Vec::new();
-        // No more than was checked above.
+        // `check` has limited this size.
         self.file.by_ref().take(bytes).read_to_end(&mut packed)?;
         let size = self.array.chunk_bytes();
         let mut chunk = vec![0; size];
         match Decompressor::new()?.decompress_to_buffer(&packed, chunk.as_mut_slice()) {
             Ok(found) if found == size => Ok(chunk),
-            Ok(found) => damaged(format!("chunk {entry} has {found} bytes decompressed, not {size}")),
+            Ok(found) => damaged(format!("chunk {entry} has {found} bytes after decompression; expected {size}")),
             Err(error) => damaged(format!("chunk {entry} cannot be decompressed: {error}")),
         }
     }

@@ -1,20 +1,20 @@
-//! The numbers of an array, and images of half the width and height.
+//! Data types, and images at half size.
 
-/// The type of an array's numbers.
+/// Data type of an array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// 8 bits without sign.
+pub enum DataType {
+    /// Unsigned 8-bit integer.
     U8,
-    /// 16 bits without sign.
+    /// Unsigned 16-bit integer.
     U16,
-    /// 32 bits without sign.
+    /// Unsigned 32-bit integer.
     U32,
-    /// IEEE 754, 32 bits.
+    /// IEEE 754 32-bit floating-point number.
     F32,
 }
 
-impl Kind {
-    /// Bytes of a number.
+impl DataType {
+    /// Returns the size of a value, bytes.
     #[must_use]
     pub fn bytes(self) -> usize {
         match self {
@@ -24,7 +24,7 @@ impl Kind {
         }
     }
 
-    /// As Zarr calls it.
+    /// Returns the name in Zarr.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -36,18 +36,18 @@ impl Kind {
     }
 }
 
-/// A number that arrays are made of: `u8`, `u16`, `u32`, `f32`.
+/// A value of an array: `u8`, `u16`, `u32` or `f32`.
 pub trait Sample: Copy + Default + PartialEq + sealed::Sealed {
-    /// Its type in an array.
-    const KIND: Kind;
+    /// Data type.
+    const KIND: DataType;
 
-    /// Appends its bytes, the lowest first.
+    /// Appends the bytes in little-endian order.
     fn put(self, out: &mut Vec<u8>);
 
-    /// The number that begins a slice of at least [`Kind::bytes`] bytes; 0 if it is shorter.
+    /// Reads a value from the start of a slice; 0 if the slice has less than [`DataType::bytes`] bytes.
     fn get(bytes: &[u8]) -> Self;
 
-    /// The mean of four; of integers `(a + b + c + d + 2) / 4`, a half upwards.
+    /// Returns the mean of four values; for integers `(a + b + c + d + 2) / 4`.
     #[must_use]
     fn mean(of: [Self; 4]) -> Self;
 }
@@ -61,7 +61,7 @@ macro_rules! sample {
         impl sealed::Sealed for $type {}
 
         impl Sample for $type {
-            const KIND: Kind = Kind::$kind;
+            const KIND: DataType = DataType::$kind;
 
             fn put(self, out: &mut Vec<u8>) {
                 out.extend_from_slice(&self.to_le_bytes());
@@ -71,10 +71,7 @@ macro_rules! sample {
                 bytes.first_chunk().map_or_else(Self::default, |bytes| Self::from_le_bytes(*bytes))
             }
 
-            #[expect(
-                clippy::cast_possible_truncation,
-                reason = "a mean is no larger than the largest, and rounded once"
-            )]
+            #[expect(clippy::cast_possible_truncation, reason = "a mean is not larger than the largest value")]
             fn mean(of: [Self; 4]) -> Self {
                 $mean(of.map(Into::into)) as Self
             }
@@ -91,17 +88,17 @@ fn mean(of: [u64; 4]) -> u64 {
     (of.iter().sum::<u64>() + 2) / 4
 }
 
-/// An image of half the width and height, each pixel the mean of two by two ([`Sample::mean`]).
+/// Halves an image: each pixel is the mean of 2 x 2 pixels ([`Sample::mean`]).
 ///
-/// `values` are rows of `width` numbers. An odd last row or column counts twice, so that a pixel at the border is the mean of those of
-/// its four that there are, a half upwards, and the result has `width.div_ceil(2)` columns. Blocks that begin at even rows and columns
-/// may be halved one by one: together they are the whole image halved.
+/// `values` are rows of `width` values; the result has `width.div_ceil(2)` columns. An odd last row or column is
+/// repeated, so a pixel at the border is the rounded mean of the pixels that exist. Blocks with even start rows and
+/// columns can be halved independently.
 #[must_use]
 pub fn halved<T: Sample>(values: &[T], width: usize) -> Vec<T> {
     by_fours(values, width, T::mean)
 }
 
-/// The same for labels, of which no mean can be taken: each pixel is the upper left of the four.
+/// Halves a label image: each pixel is the upper left one of 2 x 2 pixels.
 #[must_use]
 pub fn halved_labels<T: Sample>(values: &[T], width: usize) -> Vec<T> {
     by_fours(values, width, |[upper_left, ..]| upper_left)
@@ -128,8 +125,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn means_are_those_by_hand() {
-        // A half goes up, odd borders count twice.
+    fn small_images_are_halved_as_by_hand() {
+        // Halves round up, odd borders are repeated.
         assert_eq!(halved(&[0_u8, 1, 9, 1, 0, 8, 5, 6, 250], 3), [1, 9, 6, 250]);
         assert_eq!(halved(&[255_u8; 12], 4), [255; 4]);
         assert_eq!(halved(&[u32::MAX; 4], 2), [u32::MAX]);
@@ -141,7 +138,7 @@ mod tests {
     proptest! {
         /// Against the sum over the pixels that there are.
         #[test]
-        fn pixels_are_means_of_those_that_there_are(width in 1_usize..20, height in 1_usize..20, seed in 0_u64..1000) {
+        fn pixels_are_means_of_existing_pixels(width in 1_usize..20, height in 1_usize..20, seed in 0_u64..1000) {
             let at = |x: usize, y: usize| (x as u64 * 7919 + y as u64 * 104_729 + seed * 31) % 65_536;
             let values: Vec<u16> =
                 (0..width * height).map(|i| u16::try_from(at(i % width, i / width)).unwrap()).collect();

@@ -1,4 +1,4 @@
-//! A shard as bytes.
+//! Encoding shards.
 
 use zstd::bulk::Compressor;
 use zstd::zstd_safe::CParameter;
@@ -7,19 +7,19 @@ use crate::array::{Array, Block, Shard, ZSTD_LEVEL};
 use crate::error::{Error, argument};
 use crate::sample::Sample;
 
-/// The index's mark of a chunk that is not there.
+/// Index entry of a missing chunk.
 pub(crate) const ABSENT: [u64; 2] = [u64::MAX; 2];
 
-/// Encodes a shard piece by piece, as planes come: what it returns is appended to the file, the index last. The same values give the same
-/// bytes.
+/// Encodes a shard plane by plane. The caller appends the returned bytes to the file, the index last. Equal values give
+/// equal bytes.
 ///
-/// Every chunk in the array is written, also one of zeros: so a chunk, or a file, that is missing was lost.
+/// All chunks are written, also those of zeros, so a missing chunk or file is damage.
 #[derive(Debug)]
 pub struct ShardEncoder {
     array: Array,
     block: Block,
     index: Vec<[u64; 2]>,
-    /// Bytes returned so far.
+    /// Number of bytes returned so far.
     bytes: u64,
 }
 
@@ -27,39 +27,42 @@ impl ShardEncoder {
     /// Begins a shard of an array.
     ///
     /// # Errors
-    /// If the array has no such shard.
+    /// If the shard is outside the array.
     pub fn new(array: &Array, shard: Shard) -> Result<Self, Error> {
         let block = array.block(shard)?;
         Ok(Self { array: array.clone(), block, index: vec![ABSENT; array.entries()], bytes: 0 })
     }
 
-    /// What the shard holds.
+    /// Returns the part of the array in the shard.
     #[must_use]
     pub fn block(&self) -> &Block {
         &self.block
     }
 
-    /// The bytes of one channel of one plane, both counted in the array; its values are those of the [`Block`], row by row. In any order, each
-    /// once.
+    /// Encodes one channel of one plane (indices of the array). `values` are those of the [`Block`] in row-major order.
+    /// Planes may come in any order, each once.
     ///
     /// # Errors
-    /// If the plane is not in the shard or was there already, the numbers are of another type than the array's or not as many as the block has
-    /// pixels, or the compressor finds no memory.
+    /// If the plane is not in the shard or was encoded before, `T` differs from the data type of the array, the number
+    /// of values differs from the number of pixels, or the compressor has no memory.
     pub fn plane<T: Sample>(&mut self, channel: usize, plane: usize, values: &[T]) -> Result<Vec<u8>, Error> {
         let (array, block) = (&self.array, &self.block);
         if T::KIND != array.kind {
-            return argument(format!("{} for an array of {}", T::KIND.name(), array.kind.name()));
+            return argument(format!("cannot write {} to an array of {}", T::KIND.name(), array.kind.name()));
         }
         if values.len() != block.pixels() {
             let [rows, columns] = [block.rows.len(), block.columns.len()];
             return argument(format!("{} values for a block of {rows} x {columns} pixels", values.len()));
         }
         if channel >= array.shape[0] || !block.planes.contains(&plane) {
-            return argument(format!("channel {channel} of plane {plane} does not lie in a shard of {block:?}"));
+            return argument(format!(
+                "channel {channel} of plane {plane} is not in the shard of the planes {:?}",
+                block.planes
+            ));
         }
         let within = plane - block.planes.start;
         if self.index[array.entry(channel, within, 0, 0)] != ABSENT {
-            return argument(format!("channel {channel} of plane {plane} was written already"));
+            return argument(format!("channel {channel} of plane {plane} is already written"));
         }
         let mut zstd = Compressor::new(ZSTD_LEVEL)?;
         zstd.set_parameter(CParameter::ChecksumFlag(true))?;
@@ -70,7 +73,7 @@ impl ShardEncoder {
             for column in 0..width.div_ceil(side) {
                 let columns = column * side..((column + 1) * side).min(width);
                 chunk.clear();
-                // Beyond the array there are zeros.
+                // Outside the array, values are 0.
                 for line in values.chunks_exact(width).skip(row * side).take(side) {
                     line[columns.clone()].iter().for_each(|value| value.put(&mut chunk));
                     (columns.len()..side).for_each(|_| T::default().put(&mut chunk));
@@ -86,7 +89,7 @@ impl ShardEncoder {
         Ok(out)
     }
 
-    /// The last bytes of the file: the index and its checksum.
+    /// Returns the last bytes of the file: the index and its checksum.
     ///
     /// # Errors
     /// If a channel of a plane is missing.
@@ -95,7 +98,7 @@ impl ShardEncoder {
         for plane in block.planes.clone() {
             for channel in 0..array.shape[0] {
                 if self.index[array.entry(channel, plane - block.planes.start, 0, 0)] == ABSENT {
-                    return argument(format!("channel {channel} of plane {plane} was not written"));
+                    return argument(format!("channel {channel} of plane {plane} is missing"));
                 }
             }
         }
@@ -105,17 +108,18 @@ impl ShardEncoder {
     }
 }
 
-/// A whole shard as the bytes of its file: [`ShardEncoder`] at once. The values are those of the shard's [`Block`], channel by channel, plane by plane, row by row.
+/// Encodes a complete shard. `values` are those of its [`Block`]: channel by channel, plane by plane, row by row.
 ///
 /// # Errors
-/// If the array has no such shard, the numbers are of another type than the array's or not as many as the block has, or the compressor finds no memory.
+/// If the shard is outside the array, `T` differs from the data type of the array, the number of values is wrong, or
+/// the compressor has no memory.
 pub fn shard_bytes<T: Sample>(array: &Array, shard: Shard, values: &[T]) -> Result<Vec<u8>, Error> {
     let mut encoder = ShardEncoder::new(array, shard)?;
     let Block { planes, .. } = encoder.block.clone();
     let (pixels, channels) = (encoder.block.pixels(), array.shape[0]);
     if values.len() != pixels * planes.len() * channels {
         return argument(format!(
-            "{} values for {channels} channels of {} planes of {pixels} pixels",
+            "{} values for {channels} channels x {} planes x {pixels} pixels",
             values.len(),
             planes.len()
         ));

@@ -6,7 +6,7 @@ use image::GrayImage;
 use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::{Band, CellMix, Chromatin, Clusters, Debris, Layout, Number, PhotonNoise, Preset, Recipe};
-use papsynth::scene::Kind;
+use papsynth::scene::ObjectKind;
 use papsynth::truth::{ObjectTruth, Part};
 use papsynth::{Engine, Frame, Inputs};
 
@@ -84,23 +84,23 @@ fn with_cells(mut recipe: Recipe, class: &str, count: f64) -> Recipe {
     recipe
 }
 
-fn of_kind(frame: &Frame, kind: Kind) -> Vec<&ObjectTruth> {
+fn of_kind(frame: &Frame, kind: ObjectKind) -> Vec<&ObjectTruth> {
     frame.finished.truth.objects.iter().filter(|o| o.kind == kind && !o.truncated).collect()
 }
 
 /// Fig. 1: bacilli, leukocytes, specks and objects out of focus, a row each.
 fn debris() -> Outcome<GrayImage> {
     let mut images = Vec::new();
-    for kind in [Kind::Bacillus, Kind::Leukocyte, Kind::Speckle, Kind::OutOfFocus] {
+    for kind in [ObjectKind::Bacillus, ObjectKind::Leukocyte, ObjectKind::Speckle, ObjectKind::OutOfFocus] {
         for index in 0..5 {
             let mut recipe = empty();
             match kind {
-                Kind::Bacillus => {
+                ObjectKind::Bacillus => {
                     recipe.debris.bacilli.clusters = 2.0.into();
                     recipe.debris.bacilli.on_cells = 0.0.into();
                 }
-                Kind::Leukocyte => recipe.debris.leukocytes.clusters = 3.0.into(),
-                Kind::Speckle => recipe.debris.speckles.count = 80.0.into(),
+                ObjectKind::Leukocyte => recipe.debris.leukocytes.clusters = 3.0.into(),
+                ObjectKind::Speckle => recipe.debris.speckles.count = 80.0.into(),
                 _ => {
                     recipe.debris.out_of_focus.count = 2.0.into();
                     recipe.debris.out_of_focus.absorbance = Number::uniform(0.1, 0.3);
@@ -191,7 +191,7 @@ fn leukocytes() -> Outcome<GrayImage> {
     recipe.debris.leukocytes.per_cluster = 9.0.into();
     recipe.debris.leukocytes.cytoplasm_absorbance = 0.0.into();
     let frame = frame(&recipe, 2)?;
-    let first = of_kind(&frame, Kind::Leukocyte).first().copied().ok_or("no leukocyte")?;
+    let first = of_kind(&frame, ObjectKind::Leukocyte).first().copied().ok_or("no leukocyte")?;
     let mut masks = frame.clone();
     let ids = &frame.finished.truth.labels(papsynth::truth::Group::Debris).ids;
     for (grey, id) in masks.planes[0].grey.iter_mut().zip(ids) {

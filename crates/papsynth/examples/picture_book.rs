@@ -8,9 +8,9 @@ use image::{Rgb, RgbImage};
 use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::{
-    CellMix, Colour, Debris, Group, GroupForm, Layout, Light, Mixing, Number, Preset, Recipe, Rendition, TintMix,
+    CellMix, Colour, Debris, Group, GroupForm, Layout, LightSection, Mixing, Number, Preset, Recipe, Rendition, TintMix,
 };
-use papsynth::scene::Kind;
+use papsynth::scene::ObjectKind;
 use papsynth::truth::Part;
 use papsynth::{Engine, Frame, Inputs};
 use support::{Outcome, crop_around, enlarged, save, to_image, write};
@@ -55,12 +55,12 @@ fn main() -> Outcome<()> {
 struct Entry {
     name: &'static str,
     /// Kind of the object at the centre of the tile.
-    kind: Kind,
+    kind: ObjectKind,
     recipe: Recipe,
 }
 
 /// Returns an entry for an empty slide with the debris set by `add`.
-fn entry(name: &'static str, kind: Kind, add: impl FnOnce(&mut Debris)) -> Entry {
+fn entry(name: &'static str, kind: ObjectKind, add: impl FnOnce(&mut Debris)) -> Entry {
     let mut recipe = Preset::Lbc.recipe();
     recipe.cells.clear();
     recipe.debris = Debris::none();
@@ -89,7 +89,7 @@ fn with_cells(mut entry: Entry) -> Entry {
 
 /// Returns an entry for a class of cell.
 fn class(name: &'static str, count: f64, group: Group) -> Entry {
-    let mut entry = entry(name, Kind::Cell, |_| {});
+    let mut entry = entry(name, ObjectKind::Cell, |_| {});
     let tints = if name.contains("superficial") { TintMix::superficial() } else { TintMix::default() };
     let mix = CellMix { count: count.into(), group, tints, ..CellMix::default() };
     entry.recipe.cells.insert(name.to_owned(), mix);
@@ -130,7 +130,7 @@ fn complete(model: &Model, entries: Vec<Entry>) -> Outcome<Vec<Entry>> {
 }
 
 fn debris() -> Vec<Entry> {
-    use Kind as K;
+    use ObjectKind as K;
     vec![
         entry("neutrophils", K::Leukocyte, |d| {
             (d.leukocytes.clusters, d.leukocytes.per_cluster) = (1.0.into(), 6.0.into());
@@ -186,7 +186,7 @@ fn debris() -> Vec<Entry> {
 fn draw(entry: &Entry, colour: bool) -> Outcome<RgbImage> {
     let mut recipe = entry.recipe.clone();
     if colour {
-        recipe.light = Light::Colour(Colour {
+        recipe.light = LightSection::Colour(Colour {
             lamp_k: 5500.0.into(),
             mixing: Mixing::Spectral,
             chromatic_um: 0.0.into(),

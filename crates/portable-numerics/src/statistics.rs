@@ -1,4 +1,4 @@
-//! Statistics of small sets of numbers. Sums are made in the order of the values.
+//! Statistics of small sets of numbers. Sums run in the order of the values.
 
 /// Returns the mean; NaN for an empty slice.
 #[must_use]

@@ -1,5 +1,5 @@
-//! What one nucleus of 40 x 40 px from three donors of that size costs, and from what size on the
-//! Fourier transform beats the scan.
+//! Time of a nucleus of 40 x 40 px from three sources of that size, and of the scan and the Fourier transforms for
+//! larger sources.
 
 use std::hint::black_box;
 
@@ -15,7 +15,7 @@ fn disc(side: usize) -> Vec<f32> {
     (0..side * side).map(|i| if inside(i) { 1.0 } else { 0.0 }).collect()
 }
 
-/// White noise, averaged over 3 x 3 px to make it a texture, standard deviation about 17.
+/// Returns white noise, averaged over 3 x 3 px, with a standard deviation of about 17.
 fn texture(side: usize, rng: &mut Xoshiro256PlusPlus) -> Vec<f32> {
     let noise: Vec<f32> = (0..side * side).map(|_| (rng.next_u32() >> 16) as f32 / 370.0).collect();
     let at = |x: usize, y: usize| noise[y % side * side + x % side];

@@ -1,16 +1,16 @@
-//! Draws the picture of the README, as Fig. 5 of the paper: three sources, and two nuclei made
-//! from them, the paper's way and the default. The path to write to is the only argument.
+//! Draws the figure of the README, like Fig. 5 of the paper: three sources, and two nuclei synthesised from them, by
+//! the paper's method and by the default. The only argument is the path of the image.
 
 use image::{GrayImage, Luma};
 use quilt_texture::{QuiltParams, Quilter, Rng, Source};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
-/// Sources and target, px, and their size in the picture.
+/// Size of sources and target, px; magnification and gap of the figure.
 const SIDE: usize = 44;
 const ZOOM: usize = 3;
 const GAP: usize = 8;
 
-/// Grey levels: mean and standard deviation of a nucleus, and what is around it.
+/// Grey levels: mean and standard deviation of a nucleus, and the background.
 const MEAN: f32 = 110.0;
 const DEVIATION: f32 = 17.0;
 const PAPER: u8 = 225;
@@ -38,8 +38,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let step = SIDE * ZOOM + GAP;
     let size = [panels.len() * step - GAP, SIDE * ZOOM].map(u32::try_from);
     let [width, height] = [size[0]?, size[1]?];
-    let mut picture = GrayImage::from_pixel(width, height, Luma([PAPER]));
-    for (x, y, pixel) in picture.enumerate_pixels_mut() {
+    let mut figure = GrayImage::from_pixel(width, height, Luma([PAPER]));
+    for (x, y, pixel) in figure.enumerate_pixels_mut() {
         let (panel, x) = (x as usize / step, x as usize % step / ZOOM);
         let (pixels, mask) = &panels[panel];
         let i = y as usize / ZOOM * SIDE + x;
@@ -49,7 +49,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             pixel.0 = [grey];
         }
     }
-    picture.save(path)?;
+    figure.save(path)?;
     Ok(())
 }
 
@@ -62,8 +62,8 @@ fn ellipse(a: f32, b: f32) -> Vec<f32> {
     (0..SIDE * SIDE).map(|i| if inside(i) { 1.0 } else { 0.0 }).collect()
 }
 
-/// White noise smoothed over 3 x 3 px less itself smoothed over 7 x 7, brought to one mean and
-/// deviation under the mask: clumps of about the size of those of chromatin.
+/// Returns white noise smoothed over 3 x 3 px minus the same smoothed over 7 x 7 px, normalised under the mask: clumps
+/// of about the size of chromatin clumps.
 fn chromatin(mask: &[f32], rng: &mut impl Rng) -> Vec<f32> {
     let noise: Vec<f32> = (0..SIDE * SIDE).map(|_| (rng.next_u32() >> 8) as f32).collect();
     let smooth = |radius: usize, image: &[f32]| -> Vec<f32> {

@@ -4,10 +4,9 @@ use crate::{QuiltParams, Seam, Source};
 /// A synthesised texture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Texture {
-    /// Row by row from the top, in units of the sources; 0 outside the target.
+    /// Row-major from the top, in the unit of the sources; 0 outside the target.
     pub pixels: Vec<f32>,
-    /// Where each pixel came from, or most of it where a seam is feathered; `None` outside the
-    /// target.
+    /// The source pixel of each pixel, or the one of greater weight in a feathered seam; `None` outside the target.
     pub origins: Vec<Option<Origin>>,
     /// Width, px.
     pub width: usize,
@@ -16,30 +15,30 @@ pub struct Texture {
 /// A pixel of a source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Origin {
-    /// Which of the sources given to [`Quilter::new`](crate::Quilter::new).
+    /// Index into the sources of [`Quilter::new`](crate::Quilter::new).
     pub source: usize,
-    /// Index into the pixels given to [`Source::new`](crate::Source::new).
+    /// Index into the pixels of [`Source::new`](crate::Source::new).
     pub pixel: usize,
 }
 
-/// The texture while it is being stitched: whole patches, cut to size at the end.
+/// The texture during synthesis, which consists of complete patches; cropped at the end.
 pub(crate) struct Canvas {
     patch: usize,
     overlap: usize,
-    /// Number of patches across and down.
+    /// Number of patches along x and y.
     pub(crate) patches: [usize; 2],
     width: usize,
     pixels: Vec<f32>,
-    /// Which source pixel each came from; `None` where nothing lies yet.
+    /// Source pixel of each pixel; `None` where there is no patch yet.
     origins: Vec<Option<Origin>>,
-    /// Whether a pixel will be seen.
-    wanted: Vec<bool>,
-    joint: Joint,
+    /// Whether a pixel is inside the target.
+    in_target: Vec<bool>,
+    scratch: SeamScratch,
 }
 
-/// Scratch for one patch.
+/// Working memory of one patch.
 #[derive(Default)]
-struct Joint {
+struct SeamScratch {
     /// Weight of the new patch for each of its pixels.
     weights: Vec<f32>,
     sharp: Vec<f32>,
@@ -54,9 +53,9 @@ impl Canvas {
         let step = patch - overlap;
         let patches = [target_width, target_height].map(|n| n.saturating_sub(overlap).div_ceil(step).max(1));
         let [width, height] = patches.map(|n| n * step + overlap);
-        let mut wanted = vec![false; width * height];
-        for (row, mask) in wanted.chunks_mut(width).zip(target_mask.chunks(target_width)) {
-            row.iter_mut().zip(mask).for_each(|(wanted, &m)| *wanted = m > 0.0);
+        let mut in_target = vec![false; width * height];
+        for (row, mask) in in_target.chunks_mut(width).zip(target_mask.chunks(target_width)) {
+            row.iter_mut().zip(mask).for_each(|(in_target, &m)| *in_target = m > 0.0);
         }
         Self {
             patch,
@@ -65,51 +64,51 @@ impl Canvas {
             width,
             pixels: vec![0.0; width * height],
             origins: vec![None; width * height],
-            wanted,
-            joint: Joint::default(),
+            in_target,
+            scratch: SeamScratch::default(),
         }
     }
 
-    /// Column and row of the upper left pixel of a patch.
+    /// Returns column and row of the upper left pixel of a patch.
     pub(crate) fn corner(&self, patch: [usize; 2]) -> [usize; 2] {
         patch.map(|n| n * (self.patch - self.overlap))
     }
 
-    /// Whether a patch would show a pixel that is not there yet.
+    /// Returns whether a patch contains target pixels that are not filled yet.
     pub(crate) fn needs(&self, corner: [usize; 2]) -> bool {
         (0..self.patch).any(|y| {
             let start = self.index(corner, [0, y]);
             let row = start..start + self.patch;
-            let unseen = self.wanted[row.clone()].iter().zip(&self.origins[row]);
-            unseen.into_iter().any(|(&wanted, origin)| wanted && origin.is_none())
+            let unfilled = self.in_target[row.clone()].iter().zip(&self.origins[row]);
+            unfilled.into_iter().any(|(&in_target, origin)| in_target && origin.is_none())
         })
     }
 
-    /// Collects the pixels under the overlaps of a patch that are there and will be seen.
+    /// Collects the filled target pixels in the overlaps of a patch.
     pub(crate) fn overlaps(&self, corner: [usize; 2], pixels: &mut Vec<([usize; 2], f32)>) {
         pixels.clear();
         for y in 0..self.patch {
             let breadth = if y < self.overlap { self.patch } else { self.overlap };
             for x in 0..breadth {
                 let i = self.index(corner, [x, y]);
-                if self.wanted[i] && self.origins[i].is_some() {
+                if self.in_target[i] && self.origins[i].is_some() {
                     pixels.push(([x, y], self.pixels[i]));
                 }
             }
         }
     }
 
-    /// Joins the patch at `place` of a source to what is there.
+    /// Blends the patch at `place` of a source into the canvas.
     pub(crate) fn paste(&mut self, corner: [usize; 2], number: usize, source: &Source, place: usize, seam: Seam) {
-        let mut joint = core::mem::take(&mut self.joint);
-        self.weigh(corner, source, place, seam, &mut joint);
+        let mut scratch = core::mem::take(&mut self.scratch);
+        self.set_weights(corner, source, place, seam, &mut scratch);
         for y in 0..self.patch {
             for x in 0..self.patch {
                 let i = self.index(corner, [x, y]);
                 let from = place + y * source.stride() + x;
                 let new = source.pixels[from];
                 let weight = match self.origins[i] {
-                    Some(_) => joint.weights[y * self.patch + x],
+                    Some(_) => scratch.weights[y * self.patch + x],
                     None => 1.0,
                 };
                 if weight >= 0.5 {
@@ -119,10 +118,10 @@ impl Canvas {
                 self.pixels[i] = if weight == 1.0 { new } else { self.pixels[i] + weight * (new - self.pixels[i]) };
             }
         }
-        self.joint = joint;
+        self.scratch = scratch;
     }
 
-    /// What the target shows.
+    /// Returns the texture, cropped to the target.
     pub(crate) fn finish(self, target_width: usize, target_height: usize) -> Texture {
         let mut texture = Texture {
             pixels: Vec::with_capacity(target_width * target_height),
@@ -131,11 +130,11 @@ impl Canvas {
         };
         for y in 0..target_height {
             let row = y * self.width..y * self.width + target_width;
-            let wanted = &self.wanted[row.clone()];
-            let pixels = self.pixels[row.clone()].iter().zip(wanted);
-            texture.pixels.extend(pixels.map(|(&v, &wanted)| if wanted { v } else { 0.0 }));
-            let origins = self.origins[row].iter().zip(wanted);
-            texture.origins.extend(origins.map(|(origin, &wanted)| origin.filter(|_| wanted)));
+            let in_target = &self.in_target[row.clone()];
+            let pixels = self.pixels[row.clone()].iter().zip(in_target);
+            texture.pixels.extend(pixels.map(|(&v, &in_target)| if in_target { v } else { 0.0 }));
+            let origins = self.origins[row].iter().zip(in_target);
+            texture.origins.extend(origins.map(|(origin, &in_target)| origin.filter(|_| in_target)));
         }
         texture
     }
@@ -144,14 +143,14 @@ impl Canvas {
         (corner[1] + y) * self.width + corner[0] + x
     }
 
-    /// Sets the weights of the new patch where it covers old pixels.
-    fn weigh(&self, corner: [usize; 2], source: &Source, place: usize, seam: Seam, joint: &mut Joint) {
+    /// Sets the weights of the new patch in its overlaps.
+    fn set_weights(&self, corner: [usize; 2], source: &Source, place: usize, seam: Seam, scratch: &mut SeamScratch) {
         let (patch, overlap) = (self.patch, self.overlap);
         let old = |x, y| self.origins[self.index(corner, [x, y])].is_some();
         let rows = |mut columns: core::ops::Range<usize>, y| columns.any(|x| old(x, y));
         let left = (overlap..patch).any(|y| rows(0..overlap, y));
         let above = (0..overlap).any(|y| rows(if left { overlap } else { 0 }..patch, y));
-        let weights = &mut joint.weights;
+        let weights = &mut scratch.weights;
         weights.clear();
         weights.resize(patch * patch, 1.0);
         match seam {
@@ -163,20 +162,20 @@ impl Canvas {
                 }
             }
             Seam::MinCut { feather_px } => {
-                joint.path.resize(patch, 0);
-                // Unseen pixels and those with nothing under them are free to cut through.
+                scratch.path.resize(patch, 0);
+                // A cut through pixels outside the target, or without an old pixel, has no error.
                 let error = |x, y| {
                     let i = self.index(corner, [x, y]);
                     let d = self.pixels[i] - source.pixels[place + y * source.stride() + x];
-                    if self.wanted[i] && self.origins[i].is_some() { d * d } else { 0.0 }
+                    if self.in_target[i] && self.origins[i].is_some() { d * d } else { 0.0 }
                 };
-                for (_, turned) in [(left, false), (above, true)].into_iter().filter(|(meets, _)| *meets) {
-                    let place = |along, across| if turned { (along, across) } else { (across, along) };
+                for (_, transposed) in [(left, false), (above, true)].into_iter().filter(|(meets, _)| *meets) {
+                    let place = |along, across| if transposed { (along, across) } else { (across, along) };
                     let strip = (0..patch).flat_map(|along| (0..overlap).map(move |across| place(along, across)));
-                    joint.errors.clear();
-                    joint.errors.extend(strip.map(|(x, y)| error(x, y)));
-                    min_cut(&mut joint.errors, overlap, &mut joint.path);
-                    for (along, &cut) in joint.path.iter().enumerate() {
+                    scratch.errors.clear();
+                    scratch.errors.extend(strip.map(|(x, y)| error(x, y)));
+                    min_cut(&mut scratch.errors, overlap, &mut scratch.path);
+                    for (along, &cut) in scratch.path.iter().enumerate() {
                         for (x, y) in (0..cut).map(|across| place(along, across)) {
                             weights[y * patch + x] = 0.0;
                         }
@@ -188,11 +187,11 @@ impl Canvas {
                             *weight = 1.0;
                         }
                     }
-                    joint.sharp.clone_from(weights);
+                    scratch.sharp.clone_from(weights);
                     for y in 0..patch {
                         let breadth = if y < overlap { patch } else { overlap };
                         for x in 0..breadth {
-                            weights[y * patch + x] = blurred(&joint.sharp, patch, [x, y], feather_px, [left, above]);
+                            weights[y * patch + x] = blurred(&scratch.sharp, patch, [x, y], feather_px, [left, above]);
                         }
                     }
                 }
@@ -201,8 +200,8 @@ impl Canvas {
     }
 }
 
-/// The mean weight in a box around a pixel of a patch. Beyond the edges at which it meets a
-/// neighbour the old texture goes on, with weight 0; the others end the box.
+/// Returns the mean weight in a box around a pixel of a patch. Beyond edges with a neighbour the old texture continues,
+/// with weight 0; other edges end the box.
 fn blurred(weights: &[f32], patch: usize, at: [usize; 2], radius: usize, meets: [bool; 2]) -> f32 {
     let [(x0, x1, wide), (y0, y1, high)] = [0, 1].map(|axis| {
         let first = at[axis].saturating_sub(radius);
@@ -217,11 +216,11 @@ fn blurred(weights: &[f32], patch: usize, at: [usize; 2], radius: usize, meets: 
     }
 }
 
-/// The path of least total error through a strip, one step sideways at most from one row to the
-/// next (Efros and Freeman, doi:10.1145/383259.383296).
+/// Computes the path of least total error through a strip, with at most one step sideways from row to row (Efros and
+/// Freeman, doi:10.1145/383259.383296).
 ///
-/// `errors` has rows of `breadth`; `path` gets the column of the cut for each row. Of equal paths
-/// the leftmost is taken. `errors` is used up.
+/// `errors` has rows of `breadth` and is overwritten; `path` receives the column of the cut of each row. Of equal paths
+/// it is the leftmost.
 fn min_cut(errors: &mut [f32], breadth: usize, path: &mut [usize]) {
     // E(y, x) = e(y, x) + min(E(y - 1, x - 1), E(y - 1, x), E(y - 1, x + 1)).
     for y in 1..path.len() {
@@ -242,7 +241,7 @@ fn min_cut(errors: &mut [f32], breadth: usize, path: &mut [usize]) {
     }
 }
 
-/// The column of the least value within one of `x`, the leftmost of equals.
+/// Returns the column of the least value among the neighbours of `x`, the leftmost of equal values.
 fn least_near(row: &[f32], x: usize) -> usize {
     let mut best = x.saturating_sub(1);
     for candidate in best + 1..(x + 2).min(row.len()) {
@@ -253,8 +252,8 @@ fn least_near(row: &[f32], x: usize) -> usize {
     best
 }
 
-/// The weight of a new patch `i` pixels from its edge, fading in over the overlap. The old pixel
-/// has the rest, so that both sum to one.
+/// Returns the weight of a new patch `i` pixels from its edge, which increases over the overlap. The weight of the old
+/// pixel is 1 minus that.
 fn feather(i: usize, overlap: usize) -> f32 {
     #[expect(clippy::cast_precision_loss, reason = "at most 128")]
     if i < overlap { (i + 1) as f32 / (overlap + 1) as f32 } else { 1.0 }
@@ -268,7 +267,7 @@ mod tests {
 
     const SEED: u64 = 0x5ea3;
 
-    /// All paths through a strip, by depth-first search.
+    /// Returns the least error of all paths through a strip, by depth-first search.
     fn least(errors: &[f32], breadth: usize, y: usize, from: Option<usize>) -> f32 {
         if y * breadth == errors.len() {
             return 0.0;
@@ -284,7 +283,7 @@ mod tests {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
         for (length, breadth) in [(1, 1), (7, 5), (7, 2), (5, 1), (6, 3), (2, 5)] {
             for _ in 0..50 {
-                // Whole numbers, so that sums are exact and ties occur.
+                // Integers, so that sums are exact and ties occur.
                 let errors: Vec<_> = (0..length * breadth).map(|_| (rng.next_u32() % 10) as f32).collect();
                 let mut path = vec![0; length];
                 min_cut(&mut errors.clone(), breadth, &mut path);
@@ -296,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn feather_weights_mirror_each_other() {
+    fn feather_weights_sum_to_one() {
         for overlap in 1..9 {
             for i in 0..overlap {
                 let (new, old) = (feather(i, overlap), feather(overlap - 1 - i, overlap));

@@ -4,11 +4,11 @@ use rand_core::Rng;
 
 use crate::source::LANES;
 
-/// What a number of random tries would choose, from the costs and weights of all candidates.
+/// Draws the outcome of a number of random tries, from the costs and weights of all candidates.
 ///
-/// Each try takes a candidate with probability in proportion to its weight. The first with a cost
-/// of `enough` or less is chosen, else the first of those with the least cost. `None` if that is
-/// not below `least`.
+/// Each try selects a candidate with probability proportional to its weight. The outcome is the first candidate with a
+/// cost of at most `enough`, otherwise the first of those with the least cost. Returns `None` if that is not below
+/// `least`.
 pub(crate) fn outcome_of_tries<R: Rng + ?Sized>(
     costs: &[f32],
     weights: &[f32],
@@ -17,14 +17,13 @@ pub(crate) fn outcome_of_tries<R: Rng + ?Sized>(
     tries: usize,
     rng: &mut R,
 ) -> Option<usize> {
-    // Order the candidates by cost and let each cover a part of 0..1 in proportion to its weight:
-    // a try is a uniform number, and the best of n tries the least of n of them, which is below x
-    // with probability 1 - (1 - x)ⁿ.
+    // With candidates sorted by cost, each covers an interval of 0..1 proportional to its weight. A try is a uniform
+    // number; the best of n tries is their minimum, which is below x with probability 1 - (1 - x)ⁿ.
     #[expect(clippy::cast_precision_loss, reason = "far below 2^53 tries")]
     let least_of_tries = -libm::expm1(libm::log1p(-uniform(rng)) / tries as f64);
     let mut left = least_of_tries * level(costs, weights, f32::NEG_INFINITY, f32::INFINITY).0;
-    // All that are good enough count as one level, and so do all of one cost: which of them was
-    // tried first is a matter of their weights alone.
+    // Candidates with a cost of at most `enough` form one level, and so do candidates of equal cost: which of them
+    // comes first only depends on their weights.
     let (mut above, mut to) = (f32::NEG_INFINITY, enough);
     loop {
         let (weight, next) = level(costs, weights, above, to);
@@ -39,8 +38,7 @@ pub(crate) fn outcome_of_tries<R: Rng + ?Sized>(
     }
 }
 
-/// The candidate that covers the place `at` when those with costs above `above` and up to `to` are
-/// laid side by side.
+/// Returns the candidate at the cumulative weight `at`, among those with costs above `above` and up to `to`.
 fn one_of_level(costs: &[f32], weights: &[f32], above: f32, to: f32, mut at: f64) -> Option<usize> {
     let mut last = None;
     for slot in slots_between(costs, above, to).filter(|&slot| weights[slot] > 0.0) {
@@ -53,10 +51,10 @@ fn one_of_level(costs: &[f32], weights: &[f32], above: f32, to: f32, mut at: f64
     last
 }
 
-/// Where costs are above `above` and up to `to`.
+/// Returns the slots with costs above `above` and up to `to`.
 pub(crate) fn slots_between(costs: &[f32], above: f32, to: f32) -> impl Iterator<Item = usize> {
     let blocks = costs.as_chunks::<LANES>().0.iter().enumerate();
-    // Nearly all blocks are passed over, and this test is a few vector instructions.
+    // This vectorised test skips nearly all blocks.
     let blocks = blocks.filter(move |(_, costs)| costs.iter().fold(false, |any, &cost| any | (cost <= to)));
     blocks.flat_map(move |(block, costs)| {
         let within = move |&lane: &usize| costs[lane] > above && costs[lane] <= to;
@@ -64,7 +62,7 @@ pub(crate) fn slots_between(costs: &[f32], above: f32, to: f32) -> impl Iterator
     })
 }
 
-/// The weight of all whose costs are above `above` and up to `to`, and the least cost above `to`.
+/// Returns the total weight of costs above `above` and up to `to`, and the least cost above `to`.
 #[multiversion(targets = "simd")]
 fn level(costs: &[f32], weights: &[f32], above: f32, to: f32) -> (f64, f32) {
     let (mut sums, mut next) = ([0.0; LANES], [f32::INFINITY; LANES]);
@@ -78,11 +76,11 @@ fn level(costs: &[f32], weights: &[f32], above: f32, to: f32) -> (f64, f32) {
     (sums.iter().map(|&s: &f32| f64::from(s)).sum(), next.into_iter().fold(f32::INFINITY, f32::min))
 }
 
-/// Replaces each x by exp(least - x), `least` the smallest.
+/// Replaces each x by exp(least - x), where `least` is the smallest.
 #[multiversion(targets = "simd")]
 pub(crate) fn exp_below(xs: &mut [f32], least: f32) {
     for x in xs {
-        // e⁻ˣ = 1 / (e^(x/16))¹⁶, and six terms of the series: to 2 · 10⁻⁶ up to x = 2, 5 · 10⁻⁴ up to 8.
+        // e⁻ˣ = 1 / (e^(x/16))¹⁶, with six terms of the series: error below 2 · 10⁻⁶ up to x = 2, 5 · 10⁻⁴ up to 8.
         let y = (*x - least) * (1.0 / 16.0);
         let root = 1.0 + y * (1.0 + y * (1.0 / 2.0 + y * (1.0 / 6.0 + y * (1.0 / 24.0 + y * (1.0 / 120.0)))));
         let square = root * root;
@@ -92,9 +90,10 @@ pub(crate) fn exp_below(xs: &mut [f32], least: f32) {
     }
 }
 
-/// Whether u < exp(-x), x ≥ 0, mostly without the exponential: 1 − x ≤ exp(-x) ≤ 1 / (1 + x + x²/2 + x³/6).
+/// Returns whether u < exp(-x), for x ≥ 0, mostly without computing the exponential: 1 − x ≤ exp(-x) ≤ 1 / (1 + x +
+/// x²/2 + x³/6).
 pub(crate) fn below_exp(u: f64, x: f64) -> bool {
-    // Wider by more than what rounding can do, so that the answer never differs.
+    // Larger than rounding errors, so that the result is exact.
     const SLACK: f64 = 1e-12;
     let above = 1.0 + x * (1.0 + x * (0.5 + x / 6.0));
     u < 1.0 - x - SLACK || (u * above < 1.0 + SLACK && u < libm::exp(-x))
@@ -108,8 +107,8 @@ pub(crate) mod tests {
 
     const SEED: u64 = 0xd2a3;
 
-    /// One try after the other.
-    fn slow(
+    /// Reference implementation: one try after the other.
+    fn reference(
         costs: &[f32],
         weights: &[f32],
         enough: f32,
@@ -135,20 +134,20 @@ pub(crate) mod tests {
         best.1
     }
 
-    /// Pearson's test of two rows of counts of as many draws.
+    /// Pearson's χ² test of two samples of the same size.
     pub(crate) fn assert_same_distribution(counts: &[[f64; 2]]) {
         let terms = counts.iter().filter(|[a, b]| a + b > 0.0).map(|[a, b]| (a - b) * (a - b) / (a + b));
         let (chi_square, freedom) = (terms.clone().sum::<f64>(), terms.count() as f64 - 1.0);
         assert!(freedom >= 2.0);
-        // The mean of the distribution and four standard deviations, a little more than 0.1 %.
+        // The mean and four standard deviations of the distribution.
         assert!(chi_square < freedom + 4.0 * (2.0 * freedom).sqrt(), "{chi_square} of {freedom}");
     }
 
     #[test]
-    fn outcome_equals_that_of_tries_one_by_one() {
+    fn drawn_outcomes_have_the_distribution_of_single_tries() {
         const DRAWS: usize = 50_000;
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
-        // Few different costs, so that there are ties; every fifth place is no candidate.
+        // Few different costs, so that ties occur; every fifth slot is not a candidate.
         let (costs, weights): (Vec<f32>, Vec<f32>) = (0..2 * LANES)
             .map(|slot| {
                 if slot % 5 == 0 {
@@ -165,8 +164,8 @@ pub(crate) mod tests {
             for _ in 0..DRAWS {
                 let fast = outcome_of_tries(&costs, &weights, enough, least, tries, &mut rng);
                 counts[fast.unwrap_or(2 * LANES)][0] += 1.0;
-                let slow = slow(&costs, &weights, enough, least, tries, &mut rng);
-                counts[slow.unwrap_or(2 * LANES)][1] += 1.0;
+                let reference = reference(&costs, &weights, enough, least, tries, &mut rng);
+                counts[reference.unwrap_or(2 * LANES)][1] += 1.0;
             }
             assert_same_distribution(&counts);
         }

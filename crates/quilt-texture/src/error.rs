@@ -1,54 +1,54 @@
 use thiserror::Error as ThisError;
 
-/// Why a [`Source`](crate::Source) or a [`Quilter`](crate::Quilter) could not be made.
+/// An invalid [`Source`](crate::Source) or invalid parameters of a [`Quilter`](crate::Quilter).
 #[derive(Debug, Clone, PartialEq, ThisError)]
 #[non_exhaustive]
 pub enum Error {
-    /// Pixels, mask and width of a source do not describe one image.
+    /// Pixels, mask and width of a source are inconsistent.
     #[error(
-        "a source has {pixels} pixels, {mask} mask values and width {width}; accepted: as many mask \
-         values as pixels, in whole rows of at least one pixel"
+        "{pixels} pixels, {mask} mask values, width {width}: expected as many mask values as pixels, and a width of at \
+         least 1 that divides their number"
     )]
     Shape {
         /// Number of pixels.
         pixels: usize,
         /// Number of mask values.
         mask: usize,
-        /// Width of a row.
+        /// Width, px.
         width: usize,
     },
     /// A pixel under the mask, or a value of the mask, is NaN or infinite.
-    #[error("{slice}[{index}] is {value}; accepted: finite values")]
+    #[error("{slice}[{index}] = {value}: expected a finite number")]
     NotFinite {
         /// `pixels` or `mask`.
         slice: &'static str,
-        /// Where.
+        /// Index of the value.
         index: usize,
-        /// What it held.
+        /// The value.
         value: f32,
     },
-    /// The mask of a source covers no pixel by half.
-    #[error("the mask is nowhere 0.5 or more; accepted: at least one such pixel")]
+    /// No value of the mask of a source is 0.5 or more.
+    #[error("the mask is empty: expected at least one value of 0.5 or more")]
     EmptyMask,
-    /// A number of the parameters lies outside its range.
-    #[error("{field} is {value}; accepted: {accepted}")]
+    /// A parameter is out of range.
+    #[error("{field} = {value} is out of range: expected {accepted}")]
     Parameter {
-        /// The field of [`QuiltParams`](crate::QuiltParams) at fault.
+        /// The field of [`QuiltParams`](crate::QuiltParams).
         field: &'static str,
-        /// What it held.
+        /// The value.
         value: f64,
         /// The accepted range.
         accepted: &'static str,
     },
-    /// There is nothing to take patches from.
-    #[error("sources is empty; accepted: at least one source")]
+    /// There is no source.
+    #[error("sources is empty: expected at least one source")]
     NoSource,
-    /// No patch lies wholly under the mask of a source.
-    #[error("sources[{index}] has no room for a patch of {patch_px} px; accepted: smaller patches or larger sources")]
+    /// No patch fits completely inside the mask of a source.
+    #[error("sources[{index}] is too small for a patch of {patch_px} px: use smaller patches or larger sources")]
     SourceTooSmall {
-        /// Which source.
+        /// Index of the source.
         index: usize,
-        /// The side of a patch.
+        /// Size of a patch, px.
         patch_px: usize,
     },
 }

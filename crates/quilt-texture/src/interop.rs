@@ -1,11 +1,11 @@
-//! Sources and textures as images of `image`.
+//! Conversions from and to images of the `image` crate.
 
 use image::{GrayImage, ImageBuffer, Luma};
 
 use crate::{Error, Source, Texture};
 
 impl Source {
-    /// [`Source::new`] from images of 8 bits: grey levels 0 to 255, used where the mask is 128 or more.
+    /// Creates a source from 8-bit images: grey levels 0 to 255, used where the mask is 128 or more.
     ///
     /// ```
     /// use image::{GrayImage, ImageBuffer, Luma};
@@ -23,7 +23,7 @@ impl Source {
     ///
     /// # Errors
     ///
-    /// If the sizes differ, or the mask covers nothing.
+    /// If the sizes differ, or the mask is empty.
     pub fn from_image(pixels: &GrayImage, mask: &GrayImage) -> Result<Self, Error> {
         let levels: Vec<f32> = pixels.iter().map(|&v| f32::from(v)).collect();
         let coverage: Vec<f32> = mask.iter().map(|&v| f32::from(v) / 255.0).collect();
@@ -37,10 +37,10 @@ impl Source {
 impl From<Texture> for ImageBuffer<Luma<f32>, Vec<f32>> {
     /// # Panics
     ///
-    /// If `width` was changed so that it no longer divides the number of pixels.
+    /// If `width` does not divide the number of pixels.
     fn from(texture: Texture) -> Self {
         let [width, height] = [texture.width, texture.pixels.len() / texture.width]
-            .map(|side| u32::try_from(side).expect("sides are far below 2^32"));
+            .map(|side| u32::try_from(side).expect("sizes are far below 2^32"));
         Self::from_raw(width, height, texture.pixels).expect("whole rows")
     }
 }

@@ -1,21 +1,21 @@
 use crate::Error;
 
-/// How a texture is stitched from patches.
+/// Parameters of the synthesis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct QuiltParams {
-    /// Side of a square patch with its overlaps, px, 2 to 256. Default 9 (ours).
+    /// Size of a square patch including its overlaps, px, 2 to 256. Default 9 (ours).
     pub patch_px: usize,
-    /// How far a patch lies on its neighbours, px, 1 to half of `patch_px`. Default 3 (ours).
+    /// Overlap of neighbouring patches, px, 1 to half of `patch_px`. Default 3 (ours).
     pub overlap_px: usize,
-    /// Which candidates are good enough. Default [`Acceptance::Near`] (ours).
+    /// Acceptance of candidates. Default [`Acceptance::Near`] (ours).
     pub acceptance: Acceptance,
-    /// How a patch is joined to its neighbours. Default [`Seam::MinCut`] (ours).
+    /// Seam between neighbouring patches. Default [`Seam::MinCut`] (ours).
     pub seam: Seam,
-    /// Whether central patches come from the centres of sources. Default weighted (the paper's)
-    /// with strength 0.5 (ours).
+    /// Whether central patches come from the centres of sources. Default weighted (the paper's), with strength 0.5
+    /// (ours).
     pub centre_bias: CentreBias,
-    /// How all candidates are compared. Default [`Search::Auto`] (ours). Has no effect on
-    /// [`Acceptance::Threshold`], which tries some and compares the rest directly.
+    /// Algorithm that compares all candidates. Default [`Search::Auto`] (ours). [`Acceptance::Threshold`] ignores it:
+    /// it tries some candidates and compares the others directly.
     pub search: Search,
 }
 
@@ -33,10 +33,10 @@ impl Default for QuiltParams {
 }
 
 impl QuiltParams {
-    /// The paper's way ("Texture synthesis", Fig. 4), with the numbers of its program: patches of
-    /// 7 px with an overlap of 2, random candidates within 15 grey levels, feathered.
+    /// Returns the parameters of the paper ("Texture synthesis", Fig. 4) and its program: patches of 7 px with an
+    /// overlap of 2, random candidates within 15 grey levels, feathered.
     ///
-    /// The number of tries and the strength of the weighting are not given; these are ours.
+    /// The paper does not state the number of tries and the strength of the weighting; these are ours.
     #[must_use]
     pub fn paper() -> Self {
         Self {
@@ -83,46 +83,42 @@ fn number(field: &'static str, value: f64, accepted: &'static str, inside: bool)
     if inside && value.is_finite() { Ok(()) } else { Err(Error::Parameter { field, value, accepted }) }
 }
 
-/// Which candidates are good enough to be pasted.
-///
-/// A candidate is judged by the squared differences from what already lies under its overlaps,
-/// over those pixels that will be seen.
+/// Acceptance of candidates, by their squared differences from the target pixels in the overlaps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Acceptance {
-    /// The paper's: candidates are tried at random until one is close enough.
+    /// The paper's: random candidates are tried until one is below a threshold.
     Threshold {
-        /// Greatest root mean square difference, in units of the pixels, 0 or more. The paper's
-        /// program has 15 grey levels, for textures with a standard deviation of 17.
+        /// Largest root mean square difference, in the unit of the pixels, 0 or more. The paper's program uses 15 grey
+        /// levels, for textures with a standard deviation of 17.
         d_max: f64,
-        /// After so many candidates the best of them is taken. 1 or more; 1000 (ours).
+        /// Maximum number of tries, after which the best candidate is used. 1 or more; 1000 (ours).
         max_tries: usize,
     },
-    /// Ours, after Efros and Freeman: all candidates are compared, and one is chosen evenly from
-    /// those with SSD <= factor · minimum + floor · n · σ², n pixels compared, σ² the variance of
-    /// the sources.
+    /// Ours, after Efros and Freeman: all candidates are compared, and one is drawn uniformly from those with
+    /// SSD <= factor · minimum + floor · n · σ², for n compared pixels and the variance σ² of the sources.
     Near {
         /// 1 or more; 1.1 by default.
         factor: f64,
-        /// Mismatch that counts as none, a part of the variance, 0 or more; 0.05 by default.
-        /// Without it a patch whose overlap was copied from one place is always continued by the
-        /// pixels beside that place, and sources reappear verbatim.
+        /// Accepted mismatch, as a fraction of the variance, 0 or more; 0.05 by default. With 0, a patch whose overlap
+        /// was copied from one position is always continued by the adjacent pixels, so that sources are copied
+        /// verbatim.
         floor: f64,
     },
 }
 
-/// How a patch is joined to what lies under its overlaps.
+/// Seam between a patch and its neighbours.
 ///
-/// Measured on nuclei of Matérn texture with the default patches: a sharp cut keeps 0.91 of the
-/// variance, and its steps are 1.04 times those between neighbours in a source; a blurred cut
-/// keeps 0.87 and a feathered seam 0.85, with steps of 0.83 and 0.77.
+/// Measured on nuclei of Matérn texture with the default patches: a sharp cut preserves 0.91 of the variance, and grey
+/// level differences across it are 1.04 times those between adjacent source pixels. For a blurred cut these are 0.87
+/// and 0.83, for a feathered seam 0.85 and 0.77.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Seam {
-    /// The paper's: the new patch fades in over the overlap, with weights that sum to one.
+    /// The paper's: linear blending over the overlap, with weights that sum to one.
     Feather,
-    /// The path of least difference through the overlap (Efros and Freeman, 2001).
+    /// A cut along the path of least difference through the overlap (Efros and Freeman, 2001).
     MinCut {
-        /// The cut is blurred by a box of 2 · `feather_px` + 1 pixels. 0 to `overlap_px`. 0 by
-        /// default: every pixel is one pixel of a source.
+        /// Half width of the box that blurs the cut, 2 · `feather_px` + 1 pixels wide. 0 to `overlap_px`. Default 0:
+        /// every pixel is a pixel of a source.
         feather_px: usize,
     },
 }
@@ -130,16 +126,16 @@ pub enum Seam {
 /// Whether "patches that are to be placed close to the center of the phantom are more likely to
 /// be found in central parts of the sample images".
 ///
-/// Places are compared by Δ, the difference of their distances from the mask's edge, each
-/// relative to the largest in its mask.
+/// Positions are compared by Δ, the difference of their distances from the edge of the mask, each relative to the
+/// largest in its mask.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CentreBias {
-    /// Any place will do.
+    /// No preference.
     Off,
     /// Under [`Acceptance::Threshold`] a candidate is tried with probability
     /// exp(-strength · Δ²); under [`Acceptance::Near`] strength · n · σ² · Δ² is added to its SSD.
     Weighted {
-        /// 0 (off) to 10^6; the paper gives none.
+        /// 0 (off) to 10^6; the paper states none.
         strength: f64,
     },
 }
@@ -153,15 +149,15 @@ impl CentreBias {
     }
 }
 
-/// How all candidates are compared. The results agree but for rounding, which may tip a choice
-/// between candidates that are equally good.
+/// Algorithm that compares all candidates. Results agree except for rounding errors, which may change the choice
+/// between equally good candidates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Search {
-    /// Difference by difference, with early rejection: best for small patches.
+    /// Direct comparison with early rejection: faster for small patches.
     Direct,
-    /// By Fourier transform: best for large patches on large sources.
+    /// Fourier transforms: faster for large patches on large sources.
     Fft,
-    /// Whichever should be faster for a source.
+    /// The estimated faster one for each source.
     Auto,
 }
 
@@ -170,7 +166,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn impossible_numbers_are_errors() {
+    fn out_of_range_parameters_are_rejected() {
         let good = QuiltParams::default;
         let near = |factor, floor| Acceptance::Near { factor, floor };
         let threshold = |d_max, max_tries| Acceptance::Threshold { d_max, max_tries };
@@ -191,6 +187,6 @@ mod tests {
             assert!(matches!(bad.check(), Err(Error::Parameter { .. })), "{bad:?}");
         }
         let message = QuiltParams { patch_px: 1, ..good() }.check().unwrap_err();
-        assert_eq!(message.to_string(), "patch_px is 1; accepted: 2 to 256");
+        assert_eq!(message.to_string(), "patch_px = 1 is out of range: expected 2 to 256");
     }
 }

@@ -3,27 +3,27 @@ use multiversion::multiversion;
 use crate::Source;
 use crate::source::LANES;
 
-/// The places in one source where a patch lies wholly under the mask.
+/// The positions in one source at which a patch is completely inside the mask.
 #[derive(Debug, Clone)]
 pub(crate) struct Candidates {
-    /// One a row, in which the candidates are, perhaps with gaps.
+    /// One run for each row with candidates; runs may have gaps.
     pub(crate) runs: Vec<Run>,
     /// 0 at a candidate, infinity elsewhere, in the padded layout of the source.
     pub(crate) barrier: Vec<f32>,
     /// Offset of the upper left pixel of each candidate in that layout.
     pub(crate) places: Vec<usize>,
-    /// Number of costs of a search: whole blocks of `LANES` for each run.
+    /// Number of costs of a search, in blocks of `LANES` for each run.
     pub(crate) slots: usize,
 }
 
-/// Neighbouring places in a row of a source.
+/// Adjacent positions in a row of a source.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Run {
-    /// Offset of the first in the padded layout.
+    /// Offset of the first position in the padded layout.
     pub(crate) place: usize,
-    /// Number of blocks of `LANES` places.
+    /// Number of blocks of `LANES` positions.
     pub(crate) blocks: usize,
-    /// Where the costs of the run begin.
+    /// Index of the first cost of the run.
     pub(crate) slot: usize,
 }
 
@@ -32,7 +32,7 @@ impl Candidates {
         let (width, stride) = (source.width, source.stride());
         let mut candidates =
             Self { runs: Vec::new(), barrier: vec![f32::INFINITY; source.pixels.len()], places: Vec::new(), slots: 0 };
-        // For each column: how many rows in a row had `patch` known pixels from there on.
+        // For each column: the number of consecutive rows with `patch` pixels inside the mask from there on.
         let mut rows = vec![0; width];
         for (y, known) in source.known.chunks(width).enumerate() {
             let mut ahead = 0;
@@ -60,29 +60,29 @@ impl Candidates {
         }
     }
 
-    /// The place whose cost is kept at a slot.
+    /// Returns the position of a slot.
     pub(crate) fn place_of_slot(&self, slot: usize) -> usize {
         let run = self.runs[self.runs.partition_point(|run| run.slot <= slot) - 1];
         run.place + slot - run.slot
     }
 }
 
-/// The order in which the pixels of a template are compared, modulo its length: spread over the
-/// whole template first, so that a quarter or half of them suffices to reject most candidates.
+/// Phases of the comparison: each takes every second pixel of the template, so that half of the pixels are sufficient
+/// to reject most candidates.
 const PHASES: [usize; 2] = [0, 1];
 
-/// What a candidate must resemble.
+/// The pixels that a candidate must match.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Template {
-    /// The pixels under the overlaps that will be seen: column and row in the patch, and value.
+    /// Target pixels in the overlaps: column and row in the patch, and value.
     pub(crate) pixels: Vec<([usize; 2], f32)>,
     /// Relative distance of the centre of the patch from the edge of the target.
     pub(crate) centrality: f32,
-    /// What a squared difference of that distance costs.
+    /// Cost factor of the squared difference of that distance.
     pub(crate) weight: f32,
 }
 
-/// Costs up to which a candidate may be chosen, once the smallest is known.
+/// Largest accepted cost, as a linear function of the smallest cost.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Tolerance {
     pub(crate) factor: f32,
@@ -96,10 +96,10 @@ impl Tolerance {
     }
 }
 
-/// A template laid out over one source.
+/// A template with the pixel offsets of one source.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Laid {
-    /// Offset from the place of a candidate, and value.
+pub(crate) struct PlacedTemplate {
+    /// Offset from the position of a candidate, and value.
     pixels: Vec<(usize, f32)>,
     /// Offset of the centre of the patch.
     centre: usize,
@@ -107,8 +107,8 @@ pub(crate) struct Laid {
     weight: f32,
 }
 
-impl Laid {
-    pub(crate) fn over(&mut self, source: &Source, patch: usize, template: &Template) {
+impl PlacedTemplate {
+    pub(crate) fn set(&mut self, source: &Source, patch: usize, template: &Template) {
         let stride = source.stride();
         self.pixels.clear();
         for phase in PHASES {
@@ -121,13 +121,13 @@ impl Laid {
         self.weight = template.weight;
     }
 
-    /// Leaves only weight · Δ².
-    pub(crate) fn forget_pixels(&mut self, weight: f32) {
+    /// Removes all terms except weight · Δ².
+    pub(crate) fn clear_pixels(&mut self, weight: f32) {
         self.pixels.clear();
         self.weight = weight;
     }
 
-    /// The cost of one candidate, with the same bits as [`scan`] gives it.
+    /// Returns the cost of one candidate, with the same bits as in [`scan`].
     pub(crate) fn cost(&self, source: &Source, place: usize) -> f32 {
         let mut cost = [0.0];
         self.add_distance(&mut cost, source, place);
@@ -137,13 +137,13 @@ impl Laid {
         cost[0]
     }
 
-    /// The pixels in parts, after each of which a candidate may be given up.
+    /// Returns the pixels in parts, after each of which a candidate may be rejected.
     #[inline(always)]
     fn stages(&self) -> core::slice::Chunks<'_, (usize, f32)> {
         self.pixels.chunks(self.pixels.len().div_ceil(PHASES.len()).max(1))
     }
 
-    /// weight · Δ² of candidates side by side.
+    /// Adds weight · Δ² for adjacent candidates.
     #[inline(always)]
     fn add_distance<const N: usize>(&self, costs: &mut [f32; N], source: &Source, place: usize) {
         let depth = lanes::<N>(&source.centrality, place + self.centre);
@@ -154,14 +154,13 @@ impl Laid {
     }
 }
 
-/// Writes the cost of every candidate of a source, weight · Δ² + Σ (s - t)², or infinity once it
-/// is sure that it lies beyond the tolerance of the smallest cost. `least` is the smallest cost
-/// known before, and after.
+/// Writes the cost of every candidate of a source, weight · Δ² + Σ (s - t)², or infinity if it exceeds the tolerance.
+/// `least` is the smallest cost so far, and is updated.
 #[multiversion(targets = "simd")]
 pub(crate) fn scan(
     source: &Source,
     candidates: &Candidates,
-    laid: &Laid,
+    placed: &PlacedTemplate,
     tolerance: Tolerance,
     least: &mut f32,
     costs: &mut [f32],
@@ -171,8 +170,8 @@ pub(crate) fn scan(
         'block: for (block, out) in costs.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
             let place = run.place + block * LANES;
             let mut sum = *lanes(&candidates.barrier, place);
-            laid.add_distance(&mut sum, source, place);
-            for stage in laid.stages() {
+            placed.add_distance(&mut sum, source, place);
+            for stage in placed.stages() {
                 let bound = tolerance.bound(*least);
                 if !sum.iter().fold(false, |any, &cost| any | (cost <= bound)) {
                     *out = [f32::INFINITY; LANES];
@@ -186,7 +185,7 @@ pub(crate) fn scan(
     }
 }
 
-/// Adds Σ (s - t)² for candidates side by side.
+/// Adds Σ (s - t)² for adjacent candidates.
 #[inline(always)]
 fn add_squares<const N: usize>(sums: &mut [f32; N], pixels: &[f32], place: usize, template: &[(usize, f32)]) {
     for &(offset, v) in template {
@@ -225,7 +224,7 @@ pub(crate) mod tests {
 
     const SEED: u64 = 0x5ca2;
 
-    /// A disc of white noise, uniform in 0..1.
+    /// Returns a disc of white noise, uniform in 0..1.
     pub(crate) fn disc(width: usize, height: usize, rng: &mut impl Rng) -> Source {
         let pixels: Vec<f32> = (0..width * height).map(|_| (rng.next_u32() >> 8) as f32 / (1 << 24) as f32).collect();
         let mask: Vec<f32> = (0..width * height)
@@ -238,7 +237,7 @@ pub(crate) mod tests {
         Source::new(&pixels, &mask, width).unwrap()
     }
 
-    /// An L of random values, as two neighbours leave it.
+    /// Returns an L of random values, like the overlap with two neighbours.
     pub(crate) fn template(patch: usize, overlap: usize, rng: &mut impl Rng) -> Template {
         let all = (0..patch).flat_map(|y| (0..patch).map(move |x| [x, y]));
         Template {
@@ -251,8 +250,8 @@ pub(crate) mod tests {
         }
     }
 
-    /// Σ (s - t)² + weight · Δ² in double precision.
-    pub(crate) fn slow_cost(source: &Source, patch: usize, template: &Template, place: usize) -> f64 {
+    /// Returns Σ (s - t)² + weight · Δ² in double precision.
+    pub(crate) fn reference_cost(source: &Source, patch: usize, template: &Template, place: usize) -> f64 {
         let at = |[x, y]: [usize; 2]| place + y * source.stride() + x;
         let depth = source.centrality[at([patch / 2, patch / 2])];
         let away = f64::from(depth) - f64::from(template.centrality);
@@ -270,13 +269,13 @@ pub(crate) mod tests {
             let source = disc(width, height, &mut rng);
             let candidates = Candidates::new(&source, patch);
             let template = template(patch, overlap, &mut rng);
-            let mut laid = Laid::default();
-            laid.over(&source, patch, &template);
+            let mut placed = PlacedTemplate::default();
+            placed.set(&source, patch, &template);
             for (factor, floor) in [(1e9, 0.0), (1.1, 0.02)] {
                 let tolerance = Tolerance { factor, floor };
                 let mut costs = vec![f32::NAN; candidates.slots];
                 let mut least = f32::INFINITY;
-                scan(&source, &candidates, &laid, tolerance, &mut least, &mut costs);
+                scan(&source, &candidates, &placed, tolerance, &mut least, &mut costs);
                 let smallest = costs.iter().copied().fold(f32::INFINITY, f32::min);
                 assert_eq!(least, smallest);
                 for (slot, &cost) in costs.iter().enumerate() {
@@ -285,13 +284,13 @@ pub(crate) mod tests {
                         assert_eq!(cost, f32::INFINITY);
                         continue;
                     }
-                    let slow = slow_cost(&source, patch, &template, place);
+                    let reference = reference_cost(&source, patch, &template, place);
                     if cost.is_finite() {
-                        assert_eq!(cost, laid.cost(&source, place));
-                        // A sum of n terms in single precision errs by n ε / 2 at most.
-                        assert!((f64::from(cost) / slow - 1.0).abs() < 4e-6);
+                        assert_eq!(cost, placed.cost(&source, place));
+                        // The error of a sum of n terms in single precision is at most n ε / 2.
+                        assert!((f64::from(cost) / reference - 1.0).abs() < 4e-6);
                     } else {
-                        assert!(slow > f64::from(tolerance.bound(least)) * (1.0 - 4e-6));
+                        assert!(reference > f64::from(tolerance.bound(least)) * (1.0 - 4e-6));
                     }
                 }
             }
@@ -299,7 +298,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn places_are_those_wholly_under_the_mask() {
+    fn candidates_are_completely_inside_the_mask() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
         for (width, height, patch) in [(40, 40, 7), (9, 30, 3), (5, 5, 5), (80, 12, 2)] {
             let mask: Vec<f32> =
@@ -308,17 +307,17 @@ pub(crate) mod tests {
             let candidates = Candidates::new(&source, patch);
             let whole =
                 |&(x, y): &(usize, usize)| (y..y + patch).all(|j| (x..x + patch).all(|i| mask[j * width + i] > 0.0));
-            let slow: Vec<_> = (0..=height - patch)
+            let reference: Vec<_> = (0..=height - patch)
                 .flat_map(|y| (0..=width - patch).map(move |x| (x, y)))
                 .filter(whole)
                 .map(|(x, y)| y * source.stride() + x)
                 .collect();
-            assert_eq!(candidates.places, slow);
+            assert_eq!(candidates.places, reference);
             let open: Vec<_> = (0..candidates.slots)
                 .map(|slot| candidates.place_of_slot(slot))
                 .filter(|&place| candidates.barrier[place] == 0.0)
                 .collect();
-            assert_eq!(open, slow);
+            assert_eq!(open, reference);
         }
     }
 }

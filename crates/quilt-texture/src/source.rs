@@ -1,41 +1,40 @@
 use crate::Error;
 
-/// Candidates compared at once: one vector of AVX-512, two of AVX, four of NEON.
+/// Candidates compared at once: two vectors of AVX-512, four of AVX, eight of NEON.
 pub(crate) const LANES: usize = 32;
 
-/// Pixels behind the end of each row, so that a block of candidates may be read past it.
+/// Padding at the end of each row, so that a block of candidates can be read beyond it.
 pub(crate) const ROW_PADDING: usize = LANES;
 
-/// Coverage from which a pixel counts as belonging to the mask.
+/// Smallest coverage of a pixel inside the mask.
 pub(crate) const COVERED: f32 = 0.5;
 
-/// A texture to take patches from, known where its mask is.
+/// A masked texture, from which patches are taken.
 ///
-/// Sources that are quilted together should have a common mean and spread: patches keep their
-/// grey levels.
+/// The sources of a [`Quilter`](crate::Quilter) should have a common mean and standard deviation, because patches keep
+/// their grey levels.
 #[derive(Debug, Clone)]
 pub struct Source {
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// Rows of `stride` pixels; 0 where unknown and in the padding.
+    /// Rows of `stride` pixels; 0 outside the mask and in the padding.
     pub(crate) pixels: Vec<f32>,
-    /// Relative distance from the mask's edge, in the same layout.
+    /// Relative distance from the edge of the mask, in the same layout.
     pub(crate) centrality: Vec<f32>,
-    /// Whether a pixel is known, in rows of `width`.
+    /// Whether a pixel is inside the mask, in rows of `width`.
     pub(crate) known: Vec<bool>,
-    /// Number of known pixels, and the sum of the squares of their deviations from the mean.
+    /// Number of pixels inside the mask, and the sum of their squared deviations from the mean.
     pub(crate) count: usize,
     pub(crate) squares: f64,
 }
 
 impl Source {
-    /// Takes a texture `width` pixels wide. Pixels whose `mask` (coverage, 0 to 1) is 0.5 or more
-    /// are used, the others never looked at.
+    /// Creates a source from a texture of `width` pixels a row. Only pixels with a `mask` (coverage, 0 to 1) of 0.5 or
+    /// more are used.
     ///
     /// # Errors
     ///
-    /// If pixels, mask and width do not fit together, the mask covers nothing, or a value used is
-    /// not finite.
+    /// If pixels, mask and width are inconsistent, the mask is empty, or a used value is not finite.
     pub fn new(pixels: &[f32], mask: &[f32], width: usize) -> Result<Self, Error> {
         if width == 0 || pixels.len() != mask.len() || !pixels.len().is_multiple_of(width) {
             return Err(Error::Shape { pixels: pixels.len(), mask: mask.len(), width });
@@ -69,19 +68,19 @@ impl Source {
         Ok(Self { width, height, pixels: padded, centrality: depth, known, count, squares })
     }
 
-    /// Width, px.
+    /// Returns the width, px.
     #[must_use]
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Height, px.
+    /// Returns the height, px.
     #[must_use]
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// Pixels from one row to the next in the padded layout.
+    /// Returns the distance of rows in the padded layout.
     pub(crate) fn stride(&self) -> usize {
         self.width + ROW_PADDING
     }
@@ -96,14 +95,14 @@ fn finite<'a>(slice: &'static str, values: impl Iterator<Item = (usize, &'a f32)
     Ok(())
 }
 
-/// The distance of each pixel inside a mask from the nearest one outside, relative to the
-/// largest: 0 outside, 1 at the place farthest from the edge. All beyond the image is outside.
+/// Returns the distance of each pixel inside a mask from the nearest pixel outside, relative to the largest: 0 outside,
+/// 1 at the pixel farthest from the edge. Pixels beyond the image count as outside.
 ///
-/// Exact, by lower envelopes of parabolas (Felzenszwalb and Huttenlocher,
+/// Exact distance transform, by lower envelopes of parabolas (Felzenszwalb and Huttenlocher,
 /// doi:10.4086/toc.2012.v008a019).
 pub(crate) fn centrality(inside: &[bool], width: usize) -> Vec<f32> {
     let height = inside.len() / width;
-    // Distance up and down to the outside, squared.
+    // Squared vertical distance to the outside.
     let mut vertical = vec![0_u32; inside.len()];
     for x in 0..width {
         let mut run = 0;
@@ -124,17 +123,17 @@ pub(crate) fn centrality(inside: &[bool], width: usize) -> Vec<f32> {
         envelope.transform(row, out);
     }
     let largest = squared.iter().copied().max().unwrap_or(0).max(1);
-    #[expect(clippy::cast_precision_loss, reason = "rounded once, like any coordinate")]
+    #[expect(clippy::cast_precision_loss, reason = "rounded to single precision")]
     let root = |square: u32| (square as f32 / largest as f32).sqrt();
     squared.into_iter().map(root).collect()
 }
 
-/// The lower envelope of the parabolas (x - at)² + height along one row.
+/// The lower envelope of the parabolas (x - at)² + height of one row.
 #[derive(Default)]
 struct Envelope {
-    /// Apex and height of the parabolas on the envelope, from the left.
+    /// Position and height of the apexes of the parabolas on the envelope, from left to right.
     apexes: Vec<(i64, i64)>,
-    /// From which x on each of them is the lowest.
+    /// The first x at which each of them is the lowest.
     from: Vec<i64>,
 }
 
@@ -158,7 +157,7 @@ impl Envelope {
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
-                reason = "at most the height in the row, which fits"
+                reason = "at most the height in the row"
             )]
             {
                 *out = ((x - at) * (x - at) + height) as u32;
@@ -168,7 +167,7 @@ impl Envelope {
 
     fn push(&mut self, at: i64, height: i64) {
         while let Some(&(before, its_height)) = self.apexes.last() {
-            // First whole x at which the new parabola is no higher than the last one.
+            // First integer x at which the new parabola is not higher than the last one.
             let rise = height + at * at - its_height - before * before;
             let run = 2 * (at - before);
             let crossing = rise.div_euclid(run) + i64::from(rise.rem_euclid(run) > 0);
@@ -192,7 +191,7 @@ mod tests {
     use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
     #[test]
-    fn mismatches_are_errors() {
+    fn inconsistent_sizes_are_rejected() {
         let shape =
             |pixels: usize, mask: usize, width| Source::new(&vec![0.0; pixels], &vec![1.0; mask], width).unwrap_err();
         for bad in [shape(6, 6, 0), shape(6, 5, 3), shape(7, 7, 3)] {
@@ -201,7 +200,7 @@ mod tests {
         assert!(matches!(Source::new(&[1.0; 4], &[0.4; 4], 2), Err(Error::EmptyMask)));
         assert!(matches!(Source::new(&[], &[], 3), Err(Error::EmptyMask)));
         let nan = Source::new(&[1.0, f32::NAN], &[1.0, 1.0], 2).unwrap_err();
-        assert_eq!(nan.to_string(), "pixels[1] is NaN; accepted: finite values");
+        assert_eq!(nan.to_string(), "pixels[1] = NaN: expected a finite number");
         assert!(Source::new(&[1.0, 2.0], &[1.0, f32::NAN], 2).is_err());
     }
 
@@ -215,8 +214,8 @@ mod tests {
 
     const SEED: u64 = 0xd157;
 
-    /// The nearest outside pixel of all, with a frame of outside around the image.
-    fn slow(inside: &[bool], width: usize) -> Vec<f32> {
+    /// Reference implementation: the nearest of all outside pixels, with a frame of outside pixels around the image.
+    fn reference(inside: &[bool], width: usize) -> Vec<f32> {
         let height = inside.len() / width;
         let framed = |x: usize, y: usize| {
             let within = (1..=width).contains(&x) && (1..=height).contains(&y);
@@ -242,11 +241,11 @@ mod tests {
         for (width, height, holes) in [(1, 1, 2), (7, 5, 3), (23, 17, 40), (12, 30, 9), (16, 9, 1)] {
             for _ in 0..20 {
                 let mask: Vec<_> = (0..width * height).map(|_| !rng.next_u32().is_multiple_of(holes)).collect();
-                assert_eq!(centrality(&mask, width), slow(&mask, width));
+                assert_eq!(centrality(&mask, width), reference(&mask, width));
             }
         }
         let full = vec![true; 63];
-        assert_eq!(centrality(&full, 9), slow(&full, 9));
+        assert_eq!(centrality(&full, 9), reference(&full, 9));
         assert_eq!(centrality(&[false; 12], 4), [0.0; 12]);
     }
 }

@@ -5,23 +5,23 @@ use crate::scan::{Candidates, Template};
 use crate::source::LANES;
 use crate::{QuiltParams, Source};
 
-/// Compares a template with all places of one source at once by Fourier transforms:
-/// Σ m (s - t)² = Σ m t² - 2 (s ⋆ m t) + (s² ⋆ m), ⋆ a correlation.
+/// Compares a template with all positions of one source by Fourier transforms:
+/// Σ m (s - t)² = Σ m t² - 2 (s ⋆ m t) + (s² ⋆ m), where ⋆ is a correlation.
 #[derive(Debug, Clone)]
 pub(crate) struct Spectral {
-    /// Sides of the transform: those of the source, rounded up.
+    /// Size of the transform: that of the source, rounded up.
     grid: [usize; 2],
-    /// The mean of the source, taken off source and template against cancellation.
+    /// Mean of the source, subtracted from source and template to reduce cancellation errors.
     mean: f64,
-    /// Transforms of s and s², columns of frequencies contiguous.
+    /// Transforms of s and s², column-major.
     plain: Vec<Complex64>,
     squared: Vec<Complex64>,
     plan: ComplexPlane<f64, 8>,
 }
 
 impl Spectral {
-    /// Whether Fourier transforms beat the scan on one source: the scan takes one difference for each
-    /// candidate and pixel of the overlaps, the transforms log N steps for each of N grid pixels.
+    /// Estimates whether Fourier transforms are faster than the scan for a source. The scan computes one difference for
+    /// each candidate and overlap pixel, the transforms log N steps for each of N grid pixels.
     pub(crate) fn is_faster(source: &Source, candidates: &Candidates, params: &QuiltParams) -> bool {
         /// Measured on one core of a Zen 4 machine; only their ratio matters.
         const DIFFERENCE_NS: f64 = 0.035;
@@ -60,12 +60,12 @@ impl Spectral {
         spectral
     }
 
-    /// Sides of the transform over a source.
+    /// Returns the size of the transform of a source.
     pub(crate) fn grid(source: &Source) -> [usize; 2] {
         [source.width, source.height].map(fast_length)
     }
 
-    /// What [`scan`](crate::scan::scan) writes, without early rejection.
+    /// Writes the same costs as [`scan`](crate::scan::scan), without early rejection.
     pub(crate) fn costs(
         &self,
         source: &Source,
@@ -96,11 +96,11 @@ impl Spectral {
         }
     }
 
-    /// Σ m (s - t)² for the upper left corner of the template at every pixel of the grid.
+    /// Returns Σ m (s - t)² with the upper left corner of the template at each pixel of the grid.
     fn squares(&self, template: &Template) -> Vec<f64> {
         let [width, height] = self.grid;
         let mut constant = 0.0;
-        // Both templates, m t and m, are real and share a transform.
+        // m t and m are real, so one complex transform computes both.
         let mut image = vec![Complex64::ZERO; width * height];
         for &([x, y], v) in &template.pixels {
             let t = f64::from(v) - self.mean;
@@ -133,7 +133,7 @@ impl Spectral {
     }
 }
 
-/// The next length of the form 2^a 3^b.
+/// Returns the next length of the form 2^a 3^b.
 fn fast_length(least: usize) -> usize {
     let mut best = least.next_power_of_two();
     let mut threes = 3;
@@ -147,7 +147,7 @@ fn fast_length(least: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scan::tests::{disc, slow_cost, template};
+    use crate::scan::tests::{disc, reference_cost, template};
     use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
     const SEED: u64 = 0xff7;
@@ -168,9 +168,9 @@ mod tests {
                 if candidates.barrier[place] > 0.0 {
                     assert_eq!(cost, f32::INFINITY);
                 } else {
-                    let slow = slow_cost(&source, patch, &template, place);
+                    let reference = reference_cost(&source, patch, &template, place);
                     // Rounded to single precision.
-                    assert!((f64::from(cost) / slow - 1.0).abs() < 2e-7);
+                    assert!((f64::from(cost) / reference - 1.0).abs() < 2e-7);
                 }
             }
         }

@@ -1,4 +1,4 @@
-//! How long a cell's cytoskeleton takes, and where the time goes.
+//! Time of a cytoskeleton, and of its stages.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -9,7 +9,7 @@ use voronoi_cytoskeleton::{Diagram, LineParams, Point, Skeleton, SkeletonParams,
 const SIDE: usize = 200;
 const SEED: u64 = 7;
 
-/// A wavy outline of 420 points, as of a cell 200 pixels wide.
+/// Returns a wavy outline of 420 points, 200 pixels wide.
 fn outline() -> Vec<Point> {
     (0..420)
         .map(|k| {
@@ -28,7 +28,7 @@ fn bench(c: &mut Criterion) {
     let line = LineParams::default();
     let rng = || Xoshiro256PlusPlus::seed_from_u64(SEED);
     let diagram = skeleton.diagram(&window, &mut rng()).unwrap();
-    let rivers = skeleton.grow(&outline, &mut rng()).unwrap();
+    let paths = skeleton.grow(&outline, &mut rng()).unwrap();
     let mut image = vec![0.0; SIDE * SIDE];
 
     let mut group = c.benchmark_group("cell of 200 px, 300 sites");
@@ -36,8 +36,8 @@ fn bench(c: &mut Criterion) {
     group.bench_function("skeleton, grown and drawn", |b| {
         b.iter(|| {
             image.fill(0.0);
-            let rivers = skeleton.grow(black_box(&outline), &mut rng()).unwrap();
-            draw_into(&mut image, SIDE, &rivers, &line).unwrap();
+            let paths = skeleton.grow(black_box(&outline), &mut rng()).unwrap();
+            draw_into(&mut image, SIDE, &paths, &line).unwrap();
         });
     });
     group.bench_function("skeleton, grown", |b| {
@@ -51,12 +51,12 @@ fn bench(c: &mut Criterion) {
     group.bench_function("diagram", |b| {
         b.iter(|| Diagram::new(black_box(diagram.sites()), &window).unwrap());
     });
-    group.bench_function("rivers on a cone", |b| {
+    group.bench_function("paths on a cone", |b| {
         let cone = |[x, y]: Point| 90.0 - ((x - 100.0) * (x - 100.0) + (y - 100.0) * (y - 100.0)).sqrt();
-        b.iter(|| skeleton.rivers(black_box(&diagram), cone, &mut rng()));
+        b.iter(|| skeleton.paths(black_box(&diagram), cone, &mut rng()));
     });
     group.bench_function("drawing", |b| {
-        b.iter(|| draw_into(&mut image, SIDE, black_box(&rivers), &line).unwrap());
+        b.iter(|| draw_into(&mut image, SIDE, black_box(&paths), &line).unwrap());
     });
     group.finish();
 

@@ -1,7 +1,7 @@
-//! Clipped Voronoi diagrams, and how they come from sites.
+//! Clipped Voronoi diagrams.
 //!
-//! Every Voronoi edge is clipped once, against the window, and kept under the number of its Delaunay edge. A cell is
-//! then a walk around its site: neighbouring edges share a vertex, or the walk goes along the border in between.
+//! Every Voronoi edge is clipped against the window and stored under the index of its Delaunay edge. A cell is then a
+//! walk around its site: neighbouring edges share a vertex, or are connected along the border.
 
 use crate::error::{Error, require_coordinates};
 use crate::geometry::{Moments, Point, along, dot, sub};
@@ -9,21 +9,21 @@ use crate::window::Window;
 use spade::handles::DirectedEdgeHandle;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
 
-/// A piece of the boundary of a cell.
+/// An edge of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Edge {
-    /// Its two vertices, such that `cell` lies on the side of positive turns (from x towards y).
+    /// The two vertices; `cell` is on the left of the edge if y points up, and on the right if y points down.
     pub ends: [usize; 2],
     /// The cell on that side.
     pub cell: usize,
-    /// The cell on the other side; none where the edge lies on the border of the window.
+    /// The cell on the other side; none on the border of the window.
     pub neighbour: Option<usize>,
 }
 
-/// The Voronoi diagram of some sites in a convex window.
+/// The Voronoi diagram of sites in a convex window.
 ///
-/// Cells have the numbers of their sites. Cells, edges and vertices together fill the window: areas sum to its area, and
-/// vertices − edges + cells = 1.
+/// Cells have the indices of their sites and fill the window: their areas sum to its area, and vertices − edges + cells
+/// = 1.
 #[derive(Debug, Clone)]
 pub struct Diagram {
     pub(crate) window: Window,
@@ -36,10 +36,10 @@ pub struct Diagram {
 }
 
 impl Diagram {
-    /// The diagram of `sites` in `window`.
+    /// Computes the diagram of `sites` in `window`.
     ///
     /// # Errors
-    /// [`Error::Sites`] for no sites or two in one place, [`Error::SiteOutside`], [`Error::Coordinate`].
+    /// [`Error::Sites`] without sites or if sites coincide, [`Error::SiteOutside`], [`Error::Coordinate`].
     pub fn new(sites: &[Point], window: &Window) -> Result<Self, Error> {
         require_coordinates("site", sites)?;
         if let Some(index) = sites.iter().position(|&site| !window.contains(site)) {
@@ -52,75 +52,75 @@ impl Diagram {
     /// ([doi:10.1137/S0036144599352836](https://doi.org/10.1137/S0036144599352836), the paper's reference 27).
     ///
     /// # Differences from the paper
-    /// The centroids are those of the polygons, exact; the released program estimates them from 2000 random points.
+    /// The centroids are exact; the released program estimates them from 2000 random points.
     pub fn relax(&mut self) {
         let centroids = (0..self.sites.len())
             .map(|cell| {
                 let site = self.sites[cell];
                 let Moments { area, first, .. } = self.moments(cell);
                 let centroid = [site[0] + first[0] / area, site[1] + first[1] / area];
-                // A cell too thin to have a centroid in floating point keeps its site.
+                // A cell too thin for an accurate centroid keeps its site.
                 if self.window.contains(centroid) { centroid } else { site }
             })
             .collect();
-        // Cells are disjoint and convex, so their centroids differ; where rounding makes two of them one, the diagram
-        // is as relaxed as it can be.
+        // Cells are disjoint and convex, so that centroids differ; if two coincide by rounding, the diagram is kept.
         if let Ok(relaxed) = build(centroids, self.window.clone()) {
             *self = relaxed;
         }
     }
 
-    /// The window.
+    /// Returns the window.
     pub fn window(&self) -> &Window {
         &self.window
     }
 
-    /// The sites, as given or as relaxed.
+    /// Returns the sites.
     pub fn sites(&self) -> &[Point] {
         &self.sites
     }
 
-    /// The vertices: first those inside the window, in which three cells meet, then those on its border.
+    /// Returns the vertices: first those inside the window, where three cells meet, then those on its border.
     pub fn vertices(&self) -> &[Point] {
         &self.vertices
     }
 
-    /// Whether a vertex lies on the border of the window.
+    /// Returns whether a vertex is on the border of the window.
     pub fn is_on_border(&self, vertex: usize) -> bool {
         vertex >= self.inner
     }
 
-    /// The edges: first those between two cells, then those on the border of the window.
+    /// Returns the edges: first those between two cells, then those on the border of the window.
     pub fn edges(&self) -> &[Edge] {
         &self.edges
     }
 
-    /// The vertices around a cell, from x towards y.
+    /// Returns the vertices around a cell, oriented from x towards y.
     ///
     /// # Panics
-    /// If there is no such cell.
+    /// If `cell` is out of range.
     pub fn cell(&self, cell: usize) -> &[usize] {
         let start = cell.checked_sub(1).map_or(0, |last| self.cell_ends[last]);
         &self.cell_vertices[start..self.cell_ends[cell]]
     }
 
-    /// The corners of a cell, from x towards y.
+    /// Returns the corners of a cell, oriented from x towards y.
     ///
     /// # Panics
-    /// If there is no such cell.
+    /// If `cell` is out of range.
     pub fn corners(&self, cell: usize) -> impl DoubleEndedIterator<Item = Point> + ExactSizeIterator + Clone {
         self.cell(cell).iter().map(|&vertex| self.vertices[vertex])
     }
 
-    /// The area of a cell.
+    /// Returns the area of a cell.
     ///
     /// # Panics
-    /// If there is no such cell.
+    /// If `cell` is out of range.
     pub fn area(&self, cell: usize) -> f64 {
         self.moments(cell).area
     }
 
-    /// The energy that relaxing lowers: the squared distance to the nearest site, integrated over the window.
+    /// Returns the energy that relaxation reduces: the integral of the squared distance to the nearest site over the
+    /// window.
     pub fn energy(&self) -> f64 {
         (0..self.sites.len()).map(|cell| self.moments(cell).second).sum()
     }
@@ -130,7 +130,7 @@ impl Diagram {
     }
 }
 
-/// A site under its number: the triangulation sorts its vertices.
+/// A site with its index, because the triangulation sorts its vertices.
 #[derive(Debug, Clone, Copy)]
 struct Numbered {
     position: Point2<f64>,
@@ -148,13 +148,13 @@ impl HasPosition for Numbered {
 type Delaunay = DelaunayTriangulation<Numbered>;
 type Directed<'a> = DirectedEdgeHandle<'a, Numbered, (), (), ()>;
 
-/// Coordinates that spade refuses as too small, and that are zero for every purpose.
+/// Coordinates below this are replaced by 0, because spade rejects them as too small.
 const NEGLIGIBLE: f64 = 1e-40;
 
-/// Share of the border below which a step back is taken for the rounding that it is.
+/// Fraction of the perimeter below which a step backwards counts as a rounding error.
 const ROUNDING: f64 = 1e-9;
 
-/// Builds the diagram of sites that lie in the window.
+/// Builds the diagram of sites inside the window.
 pub(crate) fn build(sites: Vec<Point>, window: Window) -> Result<Diagram, Error> {
     let flushed = |c: f64| if c.abs() < NEGLIGIBLE { 0.0 } else { c };
     let numbered = sites
@@ -175,15 +175,15 @@ pub(crate) fn build(sites: Vec<Point>, window: Window) -> Result<Diagram, Error>
 
 struct Builder<'a> {
     delaunay: &'a Delaunay,
-    /// What has been built so far. Cells come in the order of their sites.
+    /// The diagram under construction; cells are in the order of their sites.
     diagram: Diagram,
-    /// Vertex of each Delaunay triangle whose circumcentre lies inside.
+    /// Vertex of each Delaunay triangle with its circumcentre inside.
     centres: Vec<Option<usize>>,
-    /// How far along the border each vertex on it lies.
-    reaches: Vec<f64>,
-    /// Vertices of the window's corners that are in use.
+    /// Arc length of each vertex on the border.
+    arc_lengths: Vec<f64>,
+    /// Vertices of the corners of the window, as far as used.
     corners: Vec<Option<usize>>,
-    /// Number of the Voronoi edge dual to each Delaunay edge, where any of it lies inside.
+    /// Index of the Voronoi edge dual to each Delaunay edge, if part of it is inside.
     duals: Vec<Option<usize>>,
 }
 
@@ -209,10 +209,10 @@ impl<'a> Builder<'a> {
             cell_ends: Vec::with_capacity(count),
             cell_vertices: Vec::with_capacity(7 * count),
         };
-        Self { delaunay, diagram, centres, reaches: Vec::new(), corners, duals: Vec::with_capacity(edges) }
+        Self { delaunay, diagram, centres, arc_lengths: Vec::new(), corners, duals: Vec::with_capacity(edges) }
     }
 
-    /// The Voronoi edges, each from its triangle on the right to its triangle on the left of the Delaunay edge.
+    /// Clips the Voronoi edges, each from the triangle on the right to the triangle on the left of the Delaunay edge.
     fn clip_edges(&mut self) {
         for edge in self.delaunay.undirected_edges() {
             let edge = edge.as_directed();
@@ -235,7 +235,7 @@ impl<'a> Builder<'a> {
             return Some([start, end]);
         }
         let [a, b] = edge.positions().map(|p| [p.x, p.y]);
-        // A quarter turn from a → b: around a, triangles follow each other in this direction.
+        // Perpendicular to a → b, in the order of the triangles around a.
         let direction = [a[1] - b[1], b[0] - a[0]];
         match (start, end) {
             (Some(start), None) => Some([start, self.exit(start, direction)]),
@@ -255,33 +255,33 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Where the way from a vertex inside leaves the window.
+    /// Adds the vertex where a ray from a vertex inside leaves the window.
     fn exit(&mut self, from: usize, direction: Point) -> usize {
         let origin = self.diagram.vertices[from];
         let t = self.diagram.window.clip(origin, direction, [0.0, f64::INFINITY]).map_or(0.0, |[_, exit]| exit);
         self.border_at(along(origin, direction, t))
     }
 
-    /// A new vertex on the border.
+    /// Adds a vertex on the border.
     fn border_at(&mut self, point: Point) -> usize {
-        self.reaches.push(self.diagram.window.reach_of(point));
+        self.arc_lengths.push(self.diagram.window.arc_length_of(point));
         self.diagram.vertices.push(point);
         self.diagram.vertices.len() - 1
     }
 
-    /// The vertex of a corner of the window.
+    /// Returns the vertex of a corner of the window.
     fn corner(&mut self, corner: usize) -> usize {
         if let Some(vertex) = self.corners[corner] {
             return vertex;
         }
-        self.reaches.push(self.diagram.window.reach[corner]);
+        self.arc_lengths.push(self.diagram.window.arc_length[corner]);
         self.diagram.vertices.push(self.diagram.window.corners()[corner]);
         self.corners[corner] = Some(self.diagram.vertices.len() - 1);
         self.diagram.vertices.len() - 1
     }
 
     fn walk_cells(&mut self) {
-        // Cells are stored by site, the triangulation's vertices come in its own order.
+        // Cells are in the order of sites, which differs from that of the triangulation.
         let mut by_site = vec![None; self.delaunay.num_vertices()];
         for vertex in self.delaunay.vertices() {
             by_site[vertex.data().site] = Some(vertex.fix());
@@ -310,11 +310,11 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Joins the end of a walk to its start.
+    /// Closes a walk.
     fn close(&mut self, site: usize, start: usize) {
         match self.diagram.cell_vertices[start..] {
             [] => {
-                // A single site: the cell is the window.
+                // The cell of a single site is the window.
                 let corners: Vec<usize> = (0..self.corners.len()).map(|c| self.corner(c)).collect();
                 self.diagram.cell_vertices.extend_from_slice(&corners);
                 for i in 0..corners.len() {
@@ -329,21 +329,21 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Adds the corners between two vertices on the border to the cell, and the pieces of the border to the edges.
+    /// Adds the corners between two border vertices to the cell, and the border edges to the edges.
     fn walk_border(&mut self, site: usize, from: usize, to: usize) {
-        let perimeter = self.diagram.window.reach[self.corners.len()];
-        let [start, end] = [from, to].map(|vertex| self.reaches[vertex - self.diagram.inner]);
-        let ahead = |reach: f64| {
-            let way = reach - start;
+        let perimeter = self.diagram.window.arc_length[self.corners.len()];
+        let [start, end] = [from, to].map(|vertex| self.arc_lengths[vertex - self.diagram.inner]);
+        let ahead = |arc_length: f64| {
+            let way = arc_length - start;
             if way < 0.0 { way + perimeter } else { way }
         };
         let way = ahead(end);
         let mut last = from;
         if way < perimeter * (1.0 - ROUNDING) {
             let count = self.corners.len();
-            let next = (0..count).find(|&corner| self.diagram.window.reach[corner] > start).unwrap_or(0);
+            let next = (0..count).find(|&corner| self.diagram.window.arc_length[corner] > start).unwrap_or(0);
             for corner in (next..count).chain(0..next) {
-                let distance = ahead(self.diagram.window.reach[corner]);
+                let distance = ahead(self.diagram.window.arc_length[corner]);
                 if distance >= way {
                     break;
                 }

@@ -1,27 +1,27 @@
 use crate::error::{Error, require};
 use crate::geometry::{Point, single};
-use crate::river::River;
+use crate::path::DescentPath;
 
-/// Brightness across a line.
+/// Intensity profile across a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Profile {
-    /// Even, with edges softened over one pixel: the share of a pixel that a band of this width covers.
+    /// Constant, with anti-aliased edges: the fraction of a pixel that a band of this width covers.
     Flat,
-    /// (1 − d²/r²)² with its full width at half maximum equal to the width: close to a Gaussian, but of finite reach.
+    /// (1 − d²/r²)² with its full width at half maximum equal to the width: similar to a Gaussian, but with finite
+    /// support.
     #[default]
     Smooth,
 }
 
-/// How [`draw_into`] draws rivers.
+/// Parameters of [`draw_into`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LineParams {
-    /// Width of a line at the largest height, in pixels: above 0, at most 1000. A line thinner than a pixel is drawn
-    /// fainter. Default: 1.7 (ours; about that of the paper's lines, one pixel wide and softened).
+    /// Width of a line at the largest height, in pixels: above 0, at most 1000. Lines thinner than a pixel are fainter.
+    /// Default: 1.7 (ours; similar to the paper's lines, which are one pixel wide and smoothed).
     pub width_px: f64,
-    /// Brightness across. Default: [`Profile::Smooth`] (ours).
+    /// Intensity profile across a line. Default: [`Profile::Smooth`] (ours).
     pub profile: Profile,
-    /// How much thinner a line is at height zero: from 0 (as wide as at the top) to 1 (it vanishes). Default: 0.5
-    /// (ours).
+    /// Relative reduction of the width at height 0: from 0 (constant width) to 1 (width 0). Default: 0.5 (ours).
     pub taper: f64,
     /// Value on the axis of a line: above 0. Default: 1.
     pub peak: f32,
@@ -33,35 +33,35 @@ impl Default for LineParams {
     }
 }
 
-/// Draws rivers into an image: a pixel becomes the largest of what it holds and what the lines are there, 0 to
-/// [`LineParams::peak`], so that confluences and bends are no brighter than the lines. Parts outside the image are left out.
+/// Draws paths into an image. A pixel becomes the maximum of its value and the lines, 0 to [`LineParams::peak`], so
+/// that junctions and bends are not brighter than lines. Parts outside the image are clipped.
 ///
 /// # Errors
-/// [`Error::OutOfRange`] for a parameter outside the range its field states.
+/// [`Error::OutOfRange`] for a parameter that is out of range.
 ///
 /// # Panics
 /// If `width` is zero or does not divide the length of `image`.
-pub fn draw_into(image: &mut [f32], width: usize, rivers: &[River], params: &LineParams) -> Result<(), Error> {
+pub fn draw_into(image: &mut [f32], width: usize, paths: &[DescentPath], params: &LineParams) -> Result<(), Error> {
     let LineParams { width_px, profile: _, taper, peak } = *params;
     require("width_px", width_px, width_px > 0.0 && width_px <= 1000.0, "above 0, at most 1000")?;
     require("taper", taper, (0.0..=1.0).contains(&taper), "between 0 and 1")?;
     require("peak", f64::from(peak), peak > 0.0, "above 0")?;
     assert!(
         width > 0 && image.len().is_multiple_of(width),
-        "width {width} must divide the image's {} pixels",
+        "{} pixels are not a multiple of the width {width}",
         image.len()
     );
-    for river in rivers {
-        draw(image, width, river, params);
+    for path in paths {
+        draw(image, width, path, params);
     }
     Ok(())
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn draw(image: &mut [f32], width: usize, river: &River, params: &LineParams) {
+fn draw(image: &mut [f32], width: usize, path: &DescentPath, params: &LineParams) {
     let LineParams { width_px, profile, taper, peak } = *params;
     let half = |height: f64| width_px / 2.0 * (1.0 - taper * (1.0 - height));
-    for (points, heights) in river.points.windows(2).zip(river.heights.windows(2)) {
+    for (points, heights) in path.points.windows(2).zip(path.heights.windows(2)) {
         let halves = [half(heights[0]), half(heights[1])];
         match profile {
             Profile::Flat => splat(image, width, points, halves, 0.5, |distance2, half| {
@@ -81,14 +81,14 @@ fn draw(image: &mut [f32], width: usize, river: &River, params: &LineParams) {
     }
 }
 
-/// Where (1 − d²/r²)² ends over where it is one half: r / d = 1 / √(1 − √½).
+/// Ratio of the radius and the half width at half maximum of (1 − d²/r²)²: r / d = 1 / √(1 − √½).
 const REACH: f64 = 1.847_759_065_022_573_5;
 
-/// Smallest radius of a smooth line, in pixels: with less, a line would come and go between pixel centres.
+/// Minimum radius of a smooth line, in pixels: a thinner line would be interrupted between pixel centres.
 const NARROWEST: f64 = 1.0;
 
-/// Takes the largest of the image and `value(distance², half width)` around a segment. Lines reach their half width, or
-/// `least` if that is more, and half a pixel.
+/// Takes the maximum of the image and `value(distance², half width)` around a segment, up to a distance of the half
+/// width, or `least` if that is more, plus half a pixel.
 #[inline(always)]
 fn splat(
     image: &mut [f32],
@@ -108,7 +108,7 @@ fn splat(
     let (from, growth) = (single(halves[0]), single(halves[1] - halves[0]));
 
     for row in pixels(a[1].min(b[1]) - reach, a[1].max(b[1]) + reach, height) {
-        // The stretch of the segment within reach of this row bounds the pixels within reach of it.
+        // The part of the segment within reach of this row bounds the columns.
         let y = row as f64;
         let stretch = [y - reach, y + reach].map(|edge| ((edge - a[1]) / d[1]).clamp(0.0, 1.0));
         let [s, t] = if d[1] == 0.0 { [0.0, 1.0] } else { stretch };
@@ -127,7 +127,7 @@ fn splat(
     }
 }
 
-// Plain choices, which are one instruction a vector; the standard ones do more for NaN.
+// These compile to one vector instruction; `f32::max` and `f32::min` also handle NaN.
 
 #[inline(always)]
 fn larger(a: f32, b: f32) -> f32 {
@@ -139,7 +139,7 @@ fn smaller(a: f32, b: f32) -> f32 {
     if b < a { b } else { a }
 }
 
-/// The pixels of a row or column whose centres lie between two positions.
+/// Returns the pixels of a row or column with centres between two positions.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` saturates, which clips to the image")]
 fn pixels(from: f64, to: f64, count: usize) -> core::ops::Range<usize> {

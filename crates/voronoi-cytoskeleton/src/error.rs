@@ -1,23 +1,23 @@
 use thiserror::Error;
 
-/// Why parameters, points or polygons were refused.
+/// Invalid parameters, points or polygons.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// One number lies outside the range its field allows.
-    #[error("{field} is {value}; it must be {accepted}")]
+    /// A parameter is out of range.
+    #[error("{field} = {value} is out of range: expected {accepted}")]
     OutOfRange {
-        /// The field.
+        /// Name of the field.
         field: &'static str,
-        /// What it held.
+        /// The value.
         value: f64,
-        /// What would be accepted.
+        /// The accepted range.
         accepted: &'static str,
     },
-    /// A coordinate is NaN, infinite, or too large to reckon with.
-    #[error("{what} {index} is [{}, {}]; coordinates must lie between -1e9 and 1e9", point[0], point[1])]
+    /// A coordinate is NaN, infinite, or too large.
+    #[error("{what} {index} = [{}, {}]: expected coordinates from -1e9 to 1e9", point[0], point[1])]
     Coordinate {
-        /// What the point belongs to: `site`, `window corner` or `outline point`.
+        /// Kind of the point: `site`, `window corner` or `outline point`.
         what: &'static str,
         /// Its index.
         index: usize,
@@ -25,47 +25,49 @@ pub enum Error {
         point: [f64; 2],
     },
     /// A polygon has fewer than three points or no area.
-    #[error("the {what} of {count} points has area {area}; it must have at least 3 points and an area above zero")]
+    #[error("the {what} of {count} points has area {area}: expected at least 3 points and an area above 0")]
     Flat {
         /// The polygon: `window` or `outline`.
         what: &'static str,
-        /// Number of points given.
+        /// Number of points.
         count: usize,
         /// Its area.
         area: f64,
     },
-    /// A window is not convex, or winds around more than once.
-    #[error("the window is not convex: corner {corner} lies outside side {side}")]
+    /// A window is not convex, or its winding number is greater than 1.
+    #[error("the window is not convex: corner {corner} is outside side {side}")]
     NotConvex {
-        /// Index of a corner on the wrong side.
+        /// Index of the corner.
         corner: usize,
-        /// Index of the side it lies outside of.
+        /// Index of the side.
         side: usize,
     },
-    /// A site lies outside the window.
-    #[error("site {index} at [{}, {}] lies outside the window", point[0], point[1])]
+    /// A site is outside the window.
+    #[error("site {index} at [{}, {}] is outside the window", point[0], point[1])]
     SiteOutside {
         /// Index of the site.
         index: usize,
         /// Its coordinates.
         point: [f64; 2],
     },
-    /// No site at all, or two in the same place.
-    #[error("{given} sites lie in {distinct} different places; there must be at least one, and no two in one place")]
+    /// There is no site, or sites coincide.
+    #[error(
+        "{given} sites at {distinct} different positions: expected at least one site, and no two at the same position"
+    )]
     Sites {
-        /// Number of sites given.
+        /// Number of sites.
         given: usize,
-        /// Number of different places among them.
+        /// Number of different positions.
         distinct: usize,
     },
 }
 
-/// `value`, if it is finite and `holds`.
+/// Returns `value` if it is finite and `holds`, otherwise an error.
 pub(crate) fn require(field: &'static str, value: f64, holds: bool, accepted: &'static str) -> Result<f64, Error> {
     if value.is_finite() && holds { Ok(value) } else { Err(Error::OutOfRange { field, value, accepted }) }
 }
 
-/// Refuses coordinates whose products would lose what tells neighbours apart.
+/// Rejects coordinates whose products have too large rounding errors.
 pub(crate) fn require_coordinates(what: &'static str, points: &[[f64; 2]]) -> Result<(), Error> {
     const LARGEST: f64 = 1e9;
     let bad = |point: &[f64; 2]| !point.iter().all(|c| c.abs() <= LARGEST);

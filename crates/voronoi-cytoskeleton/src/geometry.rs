@@ -27,7 +27,7 @@ pub(crate) fn length(a: Point) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// The lowest and the highest coordinates.
+/// Returns the lowest and the highest coordinates.
 pub(crate) fn bounds(points: &[Point]) -> [Point; 2] {
     [(f64::min as fn(f64, f64) -> f64, f64::INFINITY), (f64::max, f64::NEG_INFINITY)].map(|(of, from)| {
         points.iter().fold([from; 2], |bound, point| [of(bound[0], point[0]), of(bound[1], point[1])])
@@ -43,7 +43,7 @@ pub(crate) fn single(value: f64) -> f32 {
 /// Moments of a polygon about a point.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Moments {
-    /// Signed area: positive where the corners go from x towards y.
+    /// Signed area, positive if the corners are oriented from x towards y.
     pub(crate) area: f64,
     /// Integrals of x and of y.
     pub(crate) first: Point,
@@ -52,7 +52,7 @@ pub(crate) struct Moments {
 }
 
 impl Moments {
-    /// Exact, by the triangles between `about` and each side.
+    /// Computes exact moments, from the triangles between `about` and each side.
     pub(crate) fn of(corners: impl DoubleEndedIterator<Item = Point> + Clone, about: Point) -> Self {
         let mut moments = Self::default();
         let mut a = sub(corners.clone().next_back().unwrap_or(about), about);

@@ -1,9 +1,9 @@
-//! Rivers and cells in types of other libraries.
+//! Conversions of paths and cells to types of other libraries.
 
-use crate::{Diagram, River};
+use crate::{DescentPath, Diagram};
 
-impl River {
-    /// The points of the river as points of `mint`. Outlines of other libraries' points become `[f64; 2]` by `into`.
+impl DescentPath {
+    /// Returns the points as points of `mint`. Points of other libraries convert to `[f64; 2]` with `into`.
     ///
     /// ```
     /// use mint::Point2;
@@ -12,8 +12,8 @@ impl River {
     ///
     /// let outline = [Point2 { x: 20.0, y: 30.0 }, Point2 { x: 190.0, y: 90.0 }, Point2 { x: 40.0, y: 150.0 }];
     /// let skeleton = Skeleton::new(&SkeletonParams::default())?;
-    /// let rivers = skeleton.grow(&outline.map(Into::into), &mut Xoshiro256PlusPlus::seed_from_u64(7))?;
-    /// let lines: Vec<Vec<Point2<f64>>> = rivers.iter().map(|river| river.mint_points().collect()).collect();
+    /// let paths = skeleton.grow(&outline.map(Into::into), &mut Xoshiro256PlusPlus::seed_from_u64(7))?;
+    /// let lines: Vec<Vec<Point2<f64>>> = paths.iter().map(|path| path.mint_points().collect()).collect();
     /// assert!(lines.iter().all(|line| line.len() >= 2));
     /// # Ok::<(), voronoi_cytoskeleton::Error>(())
     /// ```
@@ -22,7 +22,7 @@ impl River {
         self.points.iter().map(|&p| p.into())
     }
 
-    /// The points of the river as points of `nalgebra`.
+    /// Returns the points as points of `nalgebra`.
     #[cfg(feature = "nalgebra")]
     pub fn nalgebra_points(&self) -> impl ExactSizeIterator<Item = nalgebra::Point2<f64>> {
         self.points.iter().map(|&p| p.into())
@@ -30,16 +30,16 @@ impl River {
 }
 
 impl Diagram {
-    /// [`Diagram::corners`] as points of `mint`.
+    /// Returns [`Diagram::corners`] as points of `mint`.
     ///
     /// # Panics
-    /// If there is no such cell.
+    /// If `cell` is out of range.
     #[cfg(feature = "mint")]
     pub fn mint_corners(&self, cell: usize) -> impl ExactSizeIterator<Item = mint::Point2<f64>> {
         self.corners(cell).map(Into::into)
     }
 
-    /// [`Diagram::corners`] as points of `nalgebra`.
+    /// Returns [`Diagram::corners`] as points of `nalgebra`.
     ///
     /// ```
     /// use nalgebra::{Point2, center};
@@ -53,7 +53,7 @@ impl Diagram {
     /// ```
     ///
     /// # Panics
-    /// If there is no such cell.
+    /// If `cell` is out of range.
     #[cfg(feature = "nalgebra")]
     pub fn nalgebra_corners(&self, cell: usize) -> impl ExactSizeIterator<Item = nalgebra::Point2<f64>> {
         self.corners(cell).map(Into::into)

@@ -9,7 +9,7 @@ mod geometry;
 mod interop;
 mod lloyd;
 mod outline;
-mod river;
+mod path;
 mod skeleton;
 #[cfg(test)]
 mod testing;
@@ -20,8 +20,8 @@ pub use diagram::{Diagram, Edge};
 pub use draw::{LineParams, Profile, draw_into};
 pub use error::Error;
 pub use geometry::Point;
+pub use path::{DescentPath, PathEnd};
 pub use rand_core::Rng;
-pub use river::{Mouth, River};
 pub use skeleton::{Skeleton, SkeletonParams};
 pub use torus::Torus;
 pub use window::Window;

@@ -1,8 +1,8 @@
-//! Lloyd's algorithm without a diagram: the centroid of each cell from the sites around it alone.
+//! Lloyd's algorithm without a diagram: computes the centroid of each cell from the neighbouring sites.
 //!
-//! A cell is where v · q ≤ |q|² / 2 for every other site, q from the cell's own, and for the site's mirror image in every
-//! side of the window. Polarity turns these lines into the points 2 q / |q|², and the cell's corners into the sides of
-//! their convex hull. The hull is found by gift wrapping, of many cells side by side.
+//! A cell is the set of points v, relative to its site, with v · q ≤ |q|² / 2 for every other site q and for the mirror
+//! image of the site in every side of the window. Polar duality maps these lines to the points 2 q / |q|², and the
+//! corners of the cell to the sides of their convex hull, which gift wrapping finds for many cells at once.
 
 use crate::diagram::{Diagram, build};
 use crate::error::Error;
@@ -10,7 +10,7 @@ use crate::geometry::{Point, bounds, dot, length, sub};
 use crate::window::Window;
 use multiversion::multiversion;
 
-/// Cells worked on side by side: two of the widest registers, so that one need not wait for the other.
+/// Cells processed at once: two of the widest registers, to hide latency.
 const LANES: usize = 16;
 
 type Lanes = [f64; LANES];
@@ -18,19 +18,20 @@ type Lanes = [f64; LANES];
 /// A point in each lane.
 type Points = [Lanes; 2];
 
-/// Sites in a square of the grid, on average.
+/// Mean number of sites in a square of the grid.
 const CROWD: f64 = 1.2;
 
-/// Rings of squares around a site's own that are searched first.
+/// Rings of squares around that of a site in the first search.
 const RINGS: usize = 2;
 
-/// Distance from a side, over the side of a square, below which a site counts as this far off.
+/// Minimum distance from a side of the window, in units of the grid squares; sites closer to it count as at this
+/// distance.
 const BORDER: f64 = 1e-9;
 
-/// Sides that a cell may have; one with more is left to the triangulation.
+/// Maximum number of sides of a cell; the triangulation handles cells with more.
 const SIDES: usize = 64;
 
-/// The diagram of some sites after some passes: without diagrams in between, where that goes.
+/// Returns the diagram of sites after Lloyd passes, without intermediate diagrams if possible.
 pub(crate) fn relaxed_diagram(sites: Vec<Point>, window: &Window, passes: usize) -> Result<Diagram, Error> {
     if let Some(Ok(diagram)) = relaxed(&sites, window, passes).map(|sites| build(sites, window.clone())) {
         return Ok(diagram);
@@ -40,7 +41,7 @@ pub(crate) fn relaxed_diagram(sites: Vec<Point>, window: &Window, passes: usize)
     Ok(diagram)
 }
 
-/// The sites after some passes. None if there is a cell that this way cannot settle: one with very many sides.
+/// Returns the sites after Lloyd passes; none if a cell has too many sides.
 pub(crate) fn relaxed(sites: &[Point], window: &Window, passes: usize) -> Option<Vec<Point>> {
     let mut sites = sites.to_vec();
     for _ in 0..passes {
@@ -49,17 +50,17 @@ pub(crate) fn relaxed(sites: &[Point], window: &Window, passes: usize) -> Option
     Some(sites)
 }
 
-/// Sites sorted by squares.
+/// Sites sorted by grid squares.
 struct Grid<'a> {
     window: &'a Window,
     origin: Point,
     side: f64,
     size: [usize; 2],
-    /// Where the sites of each square begin, row by row, and the end.
+    /// Index of the first site of each square, row by row, and the end.
     starts: Vec<usize>,
     places: Vec<Point>,
     numbers: Vec<usize>,
-    /// A corner of the window on each of its sides, and the direction outwards, of length 1.
+    /// A corner on each side of the window, and its outward unit normal.
     sides: Vec<(Point, Point)>,
 }
 
@@ -67,7 +68,7 @@ impl<'a> Grid<'a> {
     fn new(sites: &[Point], window: &'a Window) -> Self {
         let [low, high] = bounds(window.corners());
         let extent = sub(high, low);
-        // In a narrow window that lies askew most squares are empty; there shall not be too many.
+        // Limits the number of empty squares for a narrow diagonal window.
         let area = window.area().max(extent[0] * extent[1] / 8.0);
         let side = (area * CROWD / sites.len() as f64).sqrt();
         let size = extent.map(|extent| floor(extent / side) + 1);
@@ -95,7 +96,7 @@ impl<'a> Grid<'a> {
         Self { window, origin: low, side, size, starts, places, numbers, sides }
     }
 
-    /// Puts the centroid of each cell that holds its own in the place of its site.
+    /// Replaces each site by the centroid of its cell, if that is inside the window.
     fn centroids(&self, sites: &mut [Point]) -> Option<()> {
         let mut open: Vec<usize> = (0..self.places.len()).collect();
         let mut group = Group::default();
@@ -130,7 +131,7 @@ impl<'a> Grid<'a> {
         Some(())
     }
 
-    /// Gathers the sites in some rings of squares around a site's, and the mirror images that may matter among them.
+    /// Gathers the sites in `rings` rings of squares around a site, and the mirror images within that range.
     fn gather(&self, site: Point, rings: usize, group: &mut Group, lane: usize) {
         let mut blocks = [[0; 2]; 2];
         for axis in 0..2 {
@@ -138,7 +139,7 @@ impl<'a> Grid<'a> {
             let square = floor(place / self.side).min(self.size[axis] - 1);
             let (first, end) = (square.saturating_sub(rings), (square + rings + 1).min(self.size[axis]));
             blocks[axis] = [first, end];
-            // Beyond the grid there is nothing to miss.
+            // There are no sites beyond the grid.
             group.room[axis][0][lane] = if first == 0 { f64::INFINITY } else { place - first as f64 * self.side };
             group.room[axis][1][lane] =
                 if end == self.size[axis] { f64::INFINITY } else { end as f64 * self.side - place };
@@ -149,7 +150,7 @@ impl<'a> Grid<'a> {
             let [from, to] = columns.map(|column| self.starts[row * self.size[0] + column]);
             group.put(&mut count, lane, self.places[from..to].iter().map(|&place| sub(place, site)));
         }
-        // A cell that lies in its room reaches no farther than the corner of the block.
+        // A cell that is complete within its range does not extend beyond the corner of the block.
         let reach = core::f64::consts::SQRT_2 * (rings + 1) as f64 * self.side;
         for &(corner, outwards) in &self.sides {
             let depth = dot(outwards, sub(corner, site));
@@ -161,18 +162,18 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// A number that is not negative, rounded down.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a saturating cast is what is meant")]
+/// Rounds a non-negative number down.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
 fn floor(number: f64) -> usize {
     number as usize
 }
 
-/// What is gathered for the cells of all lanes.
+/// The gathered neighbours of the cells of all lanes.
 #[derive(Default)]
 struct Group {
-    /// Neighbours, from the site: the first and those that fill up a lane are the site itself.
+    /// Neighbours relative to the site; the first entry, and the padding of a lane, are the site itself.
     neighbours: Vec<Points>,
-    /// How far left and right, up and down all sites are gathered.
+    /// Range of the gathered sites to the left and right, up and down.
     room: [[Lanes; 2]; 2],
 }
 
@@ -182,7 +183,7 @@ impl Group {
         self.neighbours.push(Points::default());
     }
 
-    /// Puts neighbours into a lane that holds `count`.
+    /// Appends neighbours to a lane that contains `count`.
     #[inline(always)]
     fn put(&mut self, count: &mut usize, lane: usize, neighbours: impl ExactSizeIterator<Item = Point>) {
         let end = *count + neighbours.len();
@@ -196,10 +197,10 @@ impl Group {
     }
 }
 
-/// The way from each site to the centroid of its cell; NaN where more must be gathered to know.
+/// Returns the vector from each site to the centroid of its cell; NaN if more sites must be gathered.
 #[multiversion(targets = "simd")]
 fn wrap(group: &mut Group) -> Points {
-    // Polarity. The walk starts at the farthest point, which the nearest neighbour becomes.
+    // Polar duality. The walk starts at the farthest point, the dual of the nearest neighbour.
     let mut start = Points::default();
     let mut farthest = Lanes::default();
     for points in &mut group.neighbours {
@@ -225,7 +226,7 @@ fn wrap(group: &mut Group) -> Points {
     cells.centroids()
 }
 
-/// From a point of each hull the next, such that all points lie to the left of the way there.
+/// Returns the next point of each hull, such that all points are to the left.
 #[inline(always)]
 fn turn(points: &[Points], at: &Points) -> Points {
     let mut way = [each(|lane| -at[0][lane]), each(|lane| -at[1][lane])];
@@ -233,8 +234,8 @@ fn turn(points: &[Points], at: &Points) -> Points {
     for point in points {
         let x = each(|lane| point[0][lane] - at[0][lane]);
         let y = each(|lane| point[1][lane] - at[1][lane]);
-        // Negative where the point lies to the right; adding zero makes a negative zero positive. Where four cells meet,
-        // points lie on one line, and the one behind must not be taken for one ahead.
+        // Negative if the point is to the right; adding 0 changes -0 to +0. Where four cells meet, points are
+        // collinear, and a point behind must not count as one ahead.
         let side = each(|lane| {
             let right = way[0][lane] * y[lane] - way[1][lane] * x[lane] + 0.0;
             let ahead = at[1][lane] * point[0][lane] - at[0][lane] * point[1][lane];
@@ -246,7 +247,7 @@ fn turn(points: &[Points], at: &Points) -> Points {
     next
 }
 
-/// What `value` is in each lane. A plain loop, which the compiler reliably inlines and vectorises.
+/// Returns `value` for each lane. A plain loop, which the compiler reliably inlines and vectorises.
 #[inline(always)]
 fn each(value: impl Fn(usize) -> f64) -> Lanes {
     let mut lanes = Lanes::default();
@@ -256,7 +257,7 @@ fn each(value: impl Fn(usize) -> f64) -> Lanes {
     lanes
 }
 
-/// One or the other by a sign; on bits, which stay in registers where conditions do not.
+/// Selects by a sign, with bit operations, which stay in registers.
 #[inline(always)]
 fn choose(sign: &Lanes, negative: &Lanes, positive: &Lanes) -> Lanes {
     each(|lane| {
@@ -265,23 +266,23 @@ fn choose(sign: &Lanes, negative: &Lanes, positive: &Lanes) -> Lanes {
     })
 }
 
-/// What is known of the cells after some of their corners, seen from their sites.
+/// Partial moments of the cells, relative to their sites.
 #[derive(Default)]
 struct Cells {
     first: Points,
     last: Points,
-    /// Twice the area, and six times its moments.
+    /// Twice the area, and six times the first moments.
     area: Lanes,
     moments: Points,
-    /// Whether more than half the way round is done, and all of it.
+    /// Whether more than half of the walk is done, and all of it.
     half: [bool; LANES],
     done: [bool; LANES],
-    /// Whether the circle around a corner through the site leaves the room, so that a site in it may have been missed.
+    /// Whether the circle around a corner through the site exceeds the gathered range, so that a site may be missing.
     open: [bool; LANES],
 }
 
 impl Cells {
-    /// The next corner: where the lines meet that are the points `at` and `next`.
+    /// Adds the next corner, the intersection of the lines dual to the points `at` and `next`.
     #[inline(always)]
     fn add(&mut self, step: usize, at: &Points, next: &Points, room: &[[Lanes; 2]; 2]) {
         for lane in 0..LANES {
@@ -303,7 +304,7 @@ impl Cells {
         }
     }
 
-    /// Adds the triangle between the site, the last corner and the next.
+    /// Adds the triangle of the site, the last corner and the next.
     #[inline(always)]
     fn triangle(&mut self, lane: usize, x: f64, y: f64) {
         let last = [self.last[0][lane], self.last[1][lane]];
@@ -314,7 +315,7 @@ impl Cells {
         (self.last[0][lane], self.last[1][lane]) = (x, y);
     }
 
-    /// Notes which walks have come round, or ended where there is no next line. Whether all have.
+    /// Marks the walks that are complete, or have no next line. Returns whether all are done.
     #[inline(always)]
     fn pass(&mut self, start: &Points, at: &Points) -> bool {
         let mut all = true;

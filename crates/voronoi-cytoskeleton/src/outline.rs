@@ -1,31 +1,31 @@
 use crate::error::{Error, require_coordinates};
 use crate::geometry::{Moments, Point, bounds, dot, length, single, sub};
 
-/// A closed polygon, ready for distances: the paper's "radial distance transform … from the edge".
+/// Distances from a closed polygon: the paper's "radial distance transform … from the edge".
 ///
-/// Its segments stand in blocks. The chord from a block's start to its end, and how far the block bulges from it, bound
-/// the distance so closely that a point looks at a block or two only; how the blocks span y tells which may hold a crossing.
+/// Segments are grouped into blocks. The chord of a block and its maximum deviation from the chord bound the distance
+/// so closely that only one or two blocks are evaluated for a point. The y range of a block determines whether it can
+/// contain a crossing.
 #[derive(Debug)]
 pub(crate) struct Outline {
-    /// Distances to chords are taken in single precision, from this point and in units of this length: the middle and
-    /// the diagonal of the rectangle around.
+    /// Origin and unit of the single-precision distances to chords: centre and diagonal of the bounding box.
     centre: Point,
     size: f64,
     blocks: Vec<Block>,
     groups: Vec<Group>,
 }
 
-/// Segments in a block, worked on side by side.
+/// Segments of a block, one in each vector lane.
 const LANES: usize = 8;
 
 type Lanes = [f64; LANES];
 
-/// Blocks in a group, looked at side by side.
+/// Blocks of a group, one in each vector lane.
 const CHORDS: usize = 16;
 
 type Chords = [f32; CHORDS];
 
-/// Far more than single precision errs by, as a share of the lengths at hand.
+/// Margin for rounding errors of single precision, relative to the lengths.
 const SLACK: f64 = 1e-5;
 
 /// Segments from a to b = a + d.
@@ -38,20 +38,20 @@ struct Block {
     by: Lanes,
     /// 1 / d², or 0 for a point.
     inverse: Lanes,
-    /// dx / dy, or 0 for a level segment.
+    /// dx / dy, or 0 for a horizontal segment.
     slope: Lanes,
 }
 
-/// What bounds each of some blocks.
+/// Bounds of several blocks.
 #[derive(Debug)]
 struct Group {
-    /// Start and direction of the chord, and 1 over its squared length, or 0.
+    /// Start and vector of the chord, and 1 / squared length, or 0.
     start: [Chords; 2],
     along: [Chords; 2],
     inverse: Chords,
-    /// How far from the chord the block reaches.
+    /// Maximum distance of the block from its chord.
     bulge: Chords,
-    /// The values of y that it spans.
+    /// Range of y.
     low: Chords,
     high: Chords,
 }
@@ -63,7 +63,7 @@ impl Outline {
         if points.len() < 3 || area == 0.0 {
             return Err(Error::Flat { what: "outline", count: points.len(), area });
         }
-        // The points of a block and the first of the next; a block that is not full repeats its end.
+        // The points of a block and the first of the next; an incomplete block repeats its last point.
         let chains: Vec<[Point; LANES + 1]> = (0..points.len())
             .step_by(LANES)
             .map(|first| {
@@ -82,7 +82,7 @@ impl Outline {
         })
     }
 
-    /// Distance to the polygon, positive inside (by the even-odd rule) and negative outside.
+    /// Returns the distance to the polygon, positive inside (by the even-odd rule) and negative outside.
     pub(crate) fn height(&self, point: Point) -> f64 {
         self.heights(&[point])[0]
     }
@@ -134,7 +134,7 @@ fn smaller(a: Lanes, b: Lanes) -> Lanes {
     core::array::from_fn(|i| if b[i] < a[i] { b[i] } else { a[i] })
 }
 
-/// Flags as the bits of a number.
+/// Packs flags into the bits of a number.
 #[inline(always)]
 fn bits(flag: impl Fn(usize) -> bool) -> u32 {
     let mut bits = 0;
@@ -144,7 +144,7 @@ fn bits(flag: impl Fn(usize) -> bool) -> u32 {
     bits
 }
 
-/// The indices of ones. There are few, and a walk over them has no branch to guess for the others.
+/// Returns the indices of the bits that are 1. There are few, and this loop has no branch for the others.
 #[inline(always)]
 fn ones(mut bits: u32) -> impl Iterator<Item = usize> {
     core::iter::from_fn(move || {
@@ -171,7 +171,7 @@ impl Block {
         }
     }
 
-    /// Squared distance to each segment.
+    /// Returns the squared distance to each segment.
     #[inline(always)]
     fn distance2(&self, point: Point) -> Lanes {
         core::array::from_fn(|i| {
@@ -183,7 +183,7 @@ impl Block {
         })
     }
 
-    /// Whether an odd number of segments crosses the ray from `point` to the right.
+    /// Returns whether an odd number of segments crosses the ray from `point` to the right.
     #[inline(always)]
     fn crosses(&self, point: Point) -> bool {
         let mut crossings = 0;
@@ -197,7 +197,7 @@ impl Block {
 }
 
 impl Group {
-    /// A group that is not full ends in blocks that no point is near.
+    /// Creates a group; an incomplete group is filled with blocks far from all points.
     fn new(chains: &[[Point; LANES + 1]], centre: Point, size: f64) -> Self {
         let mut group = Self {
             start: [[0.0; CHORDS]; 2],
@@ -212,7 +212,7 @@ impl Group {
             let chain = chain.map(|point| sub(point, centre).map(|way| way / size));
             let chord = sub(chain[LANES], chain[0]);
             let square = dot(chord, chord);
-            // A chord too short to be told from a point is one.
+            // A very short chord counts as a point.
             let inverse = if square > SLACK * SLACK { 1.0 / square } else { 0.0 };
             let beside = |point: &Point| {
                 let way = sub(*point, chain[0]);

@@ -1,7 +1,7 @@
-//! Windows, outlines and laws that several tests share.
+//! Windows, outlines and assertions for the tests.
 
 use crate::outline::Outline;
-use crate::{Mouth, Point, River, Window};
+use crate::{DescentPath, PathEnd, Point, Window};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 use std::collections::BTreeMap;
@@ -13,11 +13,11 @@ pub(crate) fn rng(seed: u64) -> Xoshiro256PlusPlus {
 pub(crate) fn windows() -> [Window; 5] {
     [
         Window::rectangle([0.0, 0.0], [200.0, 120.0]).unwrap(),
-        // Flat and far out.
+        // Flat and far from the origin.
         Window::rectangle([-1000.5, 3000.0], [-900.0, 3000.25]).unwrap(),
         pentagon(),
         Window::convex(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]).unwrap(),
-        // Narrow and askew.
+        // Narrow and diagonal.
         Window::convex(&[[0.0, 0.0], [100.0, 100.0], [99.0, 101.0], [-1.0, 1.0]]).unwrap(),
     ]
 }
@@ -31,19 +31,19 @@ pub(crate) fn draws(window: &Window, count: usize, seed: u64) -> Vec<Point> {
     (0..count).map(|_| window.draw(&mut rng)).collect()
 }
 
-/// Sites close to the upper and the lower border of a square of 10.
+/// Returns sites on the upper and lower border of a square of size 10.
 pub(crate) fn rim() -> Vec<Point> {
     (0..40).map(|i| [f64::from(i % 20) * 0.5, f64::from(i / 20) * 10.0]).collect()
 }
 
-/// Sites in the squares of a chessboard: four cells meet in every vertex.
+/// Returns sites on a square lattice, where four cells meet at every vertex.
 pub(crate) fn lattice(columns: u32, rows: u32) -> (Vec<Point>, Window) {
     let place = |i: u32| [f64::from(i % columns) + 0.5, f64::from(i / columns) + 0.5];
     let window = Window::rectangle([0.0, 0.0], [f64::from(columns), f64::from(rows)]).unwrap();
     ((0..columns * rows).map(place).collect(), window)
 }
 
-/// An outline about as large as a cell, with five bays of some depth.
+/// Returns an outline with five concavities of relative depth `depth`.
 pub(crate) fn cell(depth: f64) -> Vec<Point> {
     (0..420)
         .map(|k| {
@@ -54,22 +54,23 @@ pub(crate) fn cell(depth: f64) -> Vec<Point> {
         .collect()
 }
 
-/// A point as a key.
+/// Returns the bits of a point, as a map key.
 pub(crate) fn key(point: Point) -> [u64; 2] {
     point.map(f64::to_bits)
 }
 
-/// Rivers descend strictly, have the heights of their points, end on the outline or in another tree, and form trees.
-pub(crate) fn assert_rivers(rivers: &[River], outline: &[Point]) {
+/// Asserts that paths descend strictly, have the heights of their points, end on the outline or on another tree, and
+/// form trees.
+pub(crate) fn assert_paths(paths: &[DescentPath], outline: &[Point]) {
     let edge = Outline::new(outline).unwrap();
-    // A forest: edges that join two parts, never one that joins a part to itself.
+    // A forest: every edge connects two different trees.
     let mut parts: BTreeMap<[u64; 2], [u64; 2]> = BTreeMap::new();
     let root = |parts: &BTreeMap<[u64; 2], [u64; 2]>, point| {
         std::iter::successors(Some(key(point)), |point| parts.get(point).copied()).last().unwrap()
     };
-    for (number, river) in rivers.iter().enumerate() {
-        let River { points, heights, mouth } = river;
-        assert!(points.len() == heights.len() && points.len() >= 2 && river.length() > 0.0);
+    for (number, path) in paths.iter().enumerate() {
+        let DescentPath { points, heights, end } = path;
+        assert!(points.len() == heights.len() && points.len() >= 2 && path.length() > 0.0);
         assert!(heights.windows(2).all(|pair| pair[1] < pair[0]));
         assert!(heights.iter().all(|h| (0.0..=1.0).contains(h)));
         let scale = edge.height(points[0]) / heights[0];
@@ -77,9 +78,9 @@ pub(crate) fn assert_rivers(rivers: &[River], outline: &[Point]) {
             assert!((edge.height(point) - height * scale).abs() < 1e-6);
         }
         let last = points[points.len() - 1];
-        match mouth {
-            Mouth::Border => assert!(edge.height(last).abs() < 1e-6),
-            Mouth::Confluence => assert!(rivers[..number].iter().any(|other| other.points.contains(&last))),
+        match end {
+            PathEnd::Border => assert!(edge.height(last).abs() < 1e-6),
+            PathEnd::Junction => assert!(paths[..number].iter().any(|other| other.points.contains(&last))),
         }
         for pair in points.windows(2) {
             let (a, b) = (root(&parts, pair[0]), root(&parts, pair[1]));

@@ -2,34 +2,35 @@ use crate::diagram::build;
 use crate::error::{Error, require};
 use crate::geometry::{Point, bounds, dot, length, sub};
 use crate::lloyd::{relaxed, relaxed_diagram};
-use crate::river::{DEGREE, Net};
+use crate::path::{DEGREE, Graph};
 use crate::window::Window;
 use portable_numerics::random::uniform;
 use rand_core::Rng;
 use std::collections::BTreeMap;
 
-/// A relaxed Voronoi diagram without a border: of the unit square whose opposite sides are one (a flat torus).
+/// A periodic relaxed Voronoi diagram of the unit square (a flat torus).
 ///
-/// Made once, it serves any number of skeletons by [`Skeleton::grow_from`](crate::Skeleton::grow_from), each from a piece
-/// at another place, turned another way.
+/// One torus serves any number of skeletons with [`Skeleton::grow_from`](crate::Skeleton::grow_from), each from a part
+/// at a random position and rotation.
 #[derive(Debug, Clone)]
 pub struct Torus {
     sites: usize,
-    /// In and, by rounding, about the unit square.
+    /// In the unit square, up to rounding errors.
     vertices: Vec<Point>,
-    ways: Vec<[u32; DEGREE]>,
+    neighbours: Vec<[u32; DEGREE]>,
     longest: f64,
 }
 
-/// How far beyond the square sites are repeated, in mean distances between sites. A cell is its own if no circle around a
-/// corner of it through its site reaches farther than twice this; of random sites one does in e^(-π 9) of all cases.
+/// Width of the repeated margin around the square, in mean distances between sites. A cell is exact if no circle around
+/// one of its corners through its site has a diameter above this; for random sites the probability of a larger one is
+/// e^(-π 9).
 const MARGIN: f64 = 6.0;
 
 impl Torus {
-    /// A torus of sites drawn uniformly, 100 to 1 000 000, after some passes of Lloyd's algorithm, 0 to 10 000.
+    /// Creates a torus of 100 to 1 000 000 uniform random sites, after 0 to 10 000 passes of Lloyd's algorithm.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for numbers outside these ranges, [`Error::Sites`] if sites are drawn in one place.
+    /// [`Error::OutOfRange`] for numbers outside these ranges, [`Error::Sites`] if sites coincide.
     pub fn new<R: Rng + ?Sized>(sites: usize, lloyd_passes: usize, rng: &mut R) -> Result<Self, Error> {
         require("sites", sites as f64, (100..=1_000_000).contains(&sites), "between 100 and 1000000")?;
         require("lloyd_passes", lloyd_passes as f64, lloyd_passes <= 10_000, "at most 10000")?;
@@ -45,7 +46,7 @@ impl Torus {
         let (copies, originals) = repeated(&places, margin);
         let diagram = build(copies, window)?;
 
-        // The cells that meet in each vertex inside.
+        // The cells at each vertex inside.
         let mut meeting = vec![[usize::MAX; DEGREE]; diagram.inner];
         for cell in 0..originals.len() {
             for &vertex in diagram.cell(cell).iter().filter(|&&vertex| vertex < diagram.inner) {
@@ -54,7 +55,7 @@ impl Torus {
                 }
             }
         }
-        // Of the copies of a vertex the one counts that lies at the square's own copy of its first site.
+        // Of the copies of a vertex, use the one at the original of its first site.
         let key = |cells: [usize; DEGREE]| {
             let mut key = cells.map(|cell| originals.get(cell).copied().unwrap_or(usize::MAX));
             key.sort_unstable();
@@ -84,19 +85,19 @@ impl Torus {
             joined[b as usize].push(a);
             longest = longest.max(length(sub(diagram.vertices[from], diagram.vertices[to])));
         }
-        let closed = joined.iter().map(|ways| ways[..].try_into().ok()).collect::<Option<Vec<_>>>();
-        let ways = closed.filter(|ways| ways.len() == 2 * sites);
-        let ways = ways.ok_or(Error::Sites { given: sites, distinct: vertices.len() / 2 })?;
-        Ok(Self { sites, vertices, ways, longest })
+        let closed = joined.iter().map(|neighbours| neighbours[..].try_into().ok()).collect::<Option<Vec<_>>>();
+        let neighbours = closed.filter(|neighbours| neighbours.len() == 2 * sites);
+        let neighbours = neighbours.ok_or(Error::Sites { given: sites, distinct: vertices.len() / 2 })?;
+        Ok(Self { sites, vertices, neighbours, longest })
     }
 
-    /// The number of sites.
+    /// Returns the number of sites.
     pub fn sites(&self) -> usize {
         self.sites
     }
 
-    /// A piece under a window, in which lie `sites` sites on average. None if it would overlap itself.
-    pub(crate) fn place<R: Rng + ?Sized>(&self, window: &Window, sites: usize, rng: &mut R) -> Option<Net> {
+    /// Returns the part under a window, which contains `sites` sites on average; none if it would overlap itself.
+    pub(crate) fn place<R: Rng + ?Sized>(&self, window: &Window, sites: usize, rng: &mut R) -> Option<Graph> {
         let period = (window.area() * self.sites as f64 / sites as f64).sqrt();
         let [low, high] = bounds(window.corners());
         let half = [0, 1].map(|axis| (high[axis] - low[axis]) / 2.0);
@@ -106,7 +107,7 @@ impl Torus {
         let origin = [uniform(rng), uniform(rng)];
         let [x, y] = direction(rng).map(|c| c * period);
         let hand = if rng.next_u64() >> 63 == 0 { 1.0 } else { -1.0 };
-        // From the middle of the window, which lies at the origin.
+        // Relative to the centre of the window.
         let places: Vec<Point> = self
             .vertices
             .iter()
@@ -116,7 +117,7 @@ impl Torus {
             })
             .collect();
 
-        // There are two vertices to a site.
+        // There are two vertices for each site.
         let next = |chosen: &[usize]| u32::try_from(chosen.len()).ok();
         let mut numbers = vec![None; places.len()];
         let mut chosen = Vec::with_capacity(3 * sites);
@@ -127,9 +128,9 @@ impl Torus {
             }
         }
         let inner = chosen.len();
-        let mut ways = Vec::with_capacity(chosen.capacity());
+        let mut neighbours = Vec::with_capacity(chosen.capacity());
         for number in 0..inner {
-            ways.push(self.ways[chosen[number]].map(|way| {
+            neighbours.push(self.neighbours[chosen[number]].map(|way| {
                 let way = way as usize;
                 if numbers[way].is_none() {
                     numbers[way] = next(&chosen);
@@ -138,21 +139,21 @@ impl Torus {
                 numbers[way]
             }));
         }
-        ways.resize(chosen.len(), [None; DEGREE]);
+        neighbours.resize(chosen.len(), [None; DEGREE]);
         let middle = [low[0] + half[0], low[1] + half[1]];
         let vertices = chosen.iter().map(|&vertex| [middle[0] + places[vertex][0], middle[1] + places[vertex][1]]);
-        Some(Net { vertices: vertices.collect(), inner, ways })
+        Some(Graph { vertices: vertices.collect(), inner, neighbours })
     }
 }
 
-/// The shortest way between two coordinates on the torus, of a way within the square.
+/// Returns the shortest difference of two coordinates on the torus.
 fn shortest(way: f64) -> f64 {
     let back = if way > 0.5 { 1.0 } else { 0.0 };
     let forth = if way < -0.5 { 1.0 } else { 0.0 };
     way - back + forth
 }
 
-/// Sites of the unit square, then their copies within a margin around it, and which site each is a copy of.
+/// Returns the sites and their copies within a margin around the unit square, and the index of the original of each.
 fn repeated(sites: &[Point], margin: f64) -> (Vec<Point>, Vec<usize>) {
     let (mut copies, mut originals) = (sites.to_vec(), (0..sites.len()).collect::<Vec<_>>());
     let within = |c: f64| c >= -margin && c <= 1.0 + margin;
@@ -168,7 +169,7 @@ fn repeated(sites: &[Point], margin: f64) -> (Vec<Point>, Vec<usize>) {
     (copies, originals)
 }
 
-/// A direction drawn uniformly: of points in a square those in the disc.
+/// Draws a uniform random direction, by rejection of points outside the unit disc.
 fn direction<R: Rng + ?Sized>(rng: &mut R) -> Point {
     loop {
         let [x, y] = [0; 2].map(|_| 2.0 * uniform(rng) - 1.0);

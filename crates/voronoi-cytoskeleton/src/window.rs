@@ -3,20 +3,20 @@ use crate::geometry::{Moments, Point, along, bounds, cross, dot, length, sub};
 use portable_numerics::random::uniform;
 use rand_core::Rng;
 
-/// The convex polygon that a diagram fills.
+/// The convex polygon of a diagram.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Window {
-    /// In the order in which the area is positive: from x towards y.
+    /// In the order of positive area, from x towards y.
     corners: Vec<Point>,
-    /// From each corner to the next.
+    /// Vectors from each corner to the next.
     sides: Vec<Point>,
-    /// Length of the border up to each corner, and all of it.
-    pub(crate) reach: Vec<f64>,
+    /// Arc length of the border up to each corner, and the perimeter.
+    pub(crate) arc_length: Vec<f64>,
     area: f64,
 }
 
 impl Window {
-    /// The rectangle between two opposite corners.
+    /// Creates the rectangle between two opposite corners.
     ///
     /// # Errors
     /// [`Error::Coordinate`] or [`Error::Flat`].
@@ -24,10 +24,10 @@ impl Window {
         Self::convex(&[a, [b[0], a[1]], b, [a[0], b[1]]])
     }
 
-    /// The upright rectangle around some points.
+    /// Creates the bounding box of points.
     ///
     /// # Errors
-    /// [`Error::Coordinate`], or [`Error::Flat`] if all points lie on one upright or level line.
+    /// [`Error::Coordinate`], or [`Error::Flat`] if all points are on one vertical or horizontal line.
     pub fn around(points: &[Point]) -> Result<Self, Error> {
         require_coordinates("outline point", points)?;
         if points.is_empty() {
@@ -37,7 +37,7 @@ impl Window {
         Self::rectangle(low, high)
     }
 
-    /// A convex polygon, its corners in either order.
+    /// Creates a convex polygon from its corners, in either orientation.
     ///
     /// # Errors
     /// [`Error::Coordinate`], [`Error::Flat`] or [`Error::NotConvex`].
@@ -57,7 +57,7 @@ impl Window {
         if corners.len() < 3 || area == 0.0 {
             return Err(Error::Flat { what: "window", count: corners.len(), area });
         }
-        // What rounding may push a corner on a straight run to the wrong side of it.
+        // Tolerance for the rounding errors of collinear corners.
         let slack = area * 1e-12;
         let count = corners.len();
         let sides: Vec<Point> = (0..count).map(|side| sub(corners[(side + 1) % count], corners[side])).collect();
@@ -68,32 +68,32 @@ impl Window {
                 }
             }
         }
-        let mut reach = vec![0.0];
+        let mut arc_length = vec![0.0];
         for &side in &sides {
-            reach.push(reach[reach.len() - 1] + length(side));
+            arc_length.push(arc_length[arc_length.len() - 1] + length(side));
         }
-        Ok(Self { corners, sides, reach, area })
+        Ok(Self { corners, sides, arc_length, area })
     }
 
-    /// The corners, in the order in which the area is positive with x right and y down.
+    /// Returns the corners, in the order of positive area with x right and y down.
     pub fn corners(&self) -> &[Point] {
         &self.corners
     }
 
-    /// The area.
+    /// Returns the area.
     pub fn area(&self) -> f64 {
         self.area
     }
 
-    /// Whether a point lies in the window or on its border.
+    /// Returns whether a point is in the window or on its border.
     pub fn contains(&self, point: Point) -> bool {
         self.sides().all(|(from, side)| cross(side, sub(point, from)) >= 0.0)
     }
 
-    /// A point drawn uniformly.
+    /// Draws a uniform random point.
     pub fn draw<R: Rng + ?Sized>(&self, rng: &mut R) -> Point {
         let apex = self.corners[0];
-        // A triangle of the fan around the first corner, by its area, then a point in it.
+        // A triangle of the fan around the first corner, with probability proportional to area, then a point in it.
         let mut rest = uniform(rng) * self.area;
         let fan = self.corners[1..].windows(2);
         let mut triangle = [apex; 2];
@@ -111,7 +111,7 @@ impl Window {
         along(along(apex, triangle[0], u), triangle[1], v)
     }
 
-    /// The part of the line `origin + t · direction` inside the window and within a range of t.
+    /// Returns the part of the line `origin + t · direction` inside the window, within a range of t.
     pub(crate) fn clip(&self, origin: Point, direction: Point, range: [f64; 2]) -> Option<[f64; 2]> {
         let [mut from, mut to] = range;
         for (corner, side) in self.sides() {
@@ -128,22 +128,24 @@ impl Window {
         (from < to).then_some([from, to])
     }
 
-    /// How far along the border a point on it lies.
-    pub(crate) fn reach_of(&self, point: Point) -> f64 {
+    /// Returns the arc length of a point on the border.
+    pub(crate) fn arc_length_of(&self, point: Point) -> f64 {
         let distance = |&(_, (corner, side)): &(usize, (Point, Point))| {
             let way = sub(point, corner);
             let beside = cross(side, way) * cross(side, way) / dot(side, side);
-            // Beyond an end of the side, the distance to that end counts.
+            // Beyond an end of the side, the distance to that end.
             let beyond = (dot(side, way) - dot(side, side)).max(-dot(side, way)).max(0.0);
             beside + beyond * beyond / dot(side, side)
         };
         self.sides()
             .enumerate()
             .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-            .map_or(0.0, |(number, (corner, side))| self.reach[number] + dot(sub(point, corner), side) / length(side))
+            .map_or(0.0, |(number, (corner, side))| {
+                self.arc_length[number] + dot(sub(point, corner), side) / length(side)
+            })
     }
 
-    /// Each side's first corner and its direction.
+    /// Returns the first corner and the vector of each side.
     pub(crate) fn sides(&self) -> impl Iterator<Item = (Point, Point)> {
         self.corners.iter().copied().zip(self.sides.iter().copied())
     }

@@ -1,4 +1,4 @@
-//! What was found at which commit: a file of lines, and its picture.
+//! The history of benchmark results, as a file of JSON lines and a chart.
 
 use std::collections::BTreeMap;
 use std::process::Command;
@@ -13,9 +13,9 @@ use crate::shell;
 use crate::workspace::Workspace;
 
 const FILE: &str = "benches/history.jsonl";
-const PICTURE: &str = "docs/performance.svg";
+const CHART: &str = "docs/performance.svg";
 
-/// Appends a line and draws the picture anew.
+/// Appends a line and redraws the chart.
 pub(super) fn record(workspace: &Workspace, lines: &[Line]) -> Result<()> {
     let git = |words: &[&str]| shell::output(Command::new("git").args(words).current_dir(&workspace.root));
     let commit = git(&["rev-parse", "--short", "HEAD"])?.trim().to_owned();
@@ -28,15 +28,15 @@ pub(super) fn record(workspace: &Workspace, lines: &[Line]) -> Result<()> {
     let history = format!("{}{line}\n", shell::read(&path)?);
     shell::write(&path, &history)?;
     let history = history.lines().map(serde_json::from_str).collect::<Result<Vec<Value>, _>>().context(FILE)?;
-    shell::write(&workspace.root.join(PICTURE), &draw(&history))?;
-    println!("{FILE} has a line more, {PICTURE} was drawn anew.");
+    shell::write(&workspace.root.join(CHART), &draw(&history))?;
+    println!("Appended to {FILE}, and redrew {CHART}.");
     Ok(())
 }
 
-/// What is kept of a row.
+/// Returns the recorded values of a row.
 fn value(source: Source, found: &Found) -> Option<Value> {
     let figures = found.as_ref().ok()?;
-    // Six digits are more than any machine repeats.
+    // Six digits exceed the reproducibility of any machine.
     let short = |value: f64| format!("{value:.5e}").parse::<f64>().unwrap_or(value);
     let unit = match source {
         Source::Memory(_) => "MB",
@@ -46,7 +46,7 @@ fn value(source: Source, found: &Found) -> Option<Value> {
     Some(json!({ "unit": unit, "peer": figures.peer.map(short), "ours": short(figures.ours) }))
 }
 
-/// The name of the processor.
+/// Returns the name of the processor.
 fn machine() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let name = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
@@ -54,14 +54,14 @@ fn machine() -> String {
 }
 
 const SIZE: [f64; 2] = [960.0, 600.0];
-/// The corners of the chart; names stand at its right.
+/// Corners of the chart; names are on its right.
 const LEFT_TOP: [f64; 2] = [56.0, 40.0];
 const RIGHT_BOTTOM: [f64; 2] = [790.0, 540.0];
 const LABEL_PX: f64 = 17.0;
 const COLOURS: [&str; 6] = ["#1f77b4", "#d62728", "#2c8c2c", "#9450aa", "#c86e0a", "#5a5a5a"];
 
-/// How many times as much the peer needs, over commits: a line a row, its name at its end. The ratios lie on a logarithmic axis.
-#[expect(clippy::disallowed_methods, reason = "a picture for people, which reaches no pixel of a field")]
+/// Draws the ratio of the peer's and our figures over commits: a line for each row, on a logarithmic axis.
+#[expect(clippy::disallowed_methods, reason = "only for a chart")]
 fn draw(history: &[Value]) -> String {
     let mut series: BTreeMap<&str, Vec<(usize, f64)>> = BTreeMap::new();
     for (place, line) in history.iter().enumerate() {
@@ -82,7 +82,7 @@ fn draw(history: &[Value]) -> String {
     let mut svg = format!(
         "<svg xmlns='http://www.w3.org/2000/svg' width='{width}' height='{height}' font-family='sans-serif' font-size='15'>\n\
          <rect width='100%' height='100%' fill='white'/>\n<g text-anchor='middle'>\n\
-         <text x='{:.0}' y='24'>The peer's time or memory over ours</text>\n<text x='{:.0}' y='588'>commit</text>\n",
+         <text x='{:.0}' y='24'>Time or memory of the peer relative to ours</text>\n<text x='{:.0}' y='588'>commit</text>\n",
         width / 2.0,
         (left + right) / 2.0
     );
@@ -112,7 +112,7 @@ fn draw(history: &[Value]) -> String {
         }
         labels.extend(points.last().map(|(x, y, ratio)| (*x, *y, format!("{name} {ratio:.1}"), colour)));
     }
-    // Names that would lie on each other move apart.
+    // Moves overlapping names apart.
     labels.sort_by(|a, b| a.1.total_cmp(&b.1));
     let mut free = 0.0;
     for (x, y, text, colour) in labels {
@@ -129,18 +129,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_row_with_a_peer_has_its_line_and_every_commit_its_place() {
+    fn the_chart_contains_every_commit_and_every_row_with_a_peer() {
         let line = |commit: &str, ours: f64| {
             json!({ "commit": commit, "rows": {
                 "noise": { "unit": "ms", "peer": 57.0, "ours": ours },
                 "growth": { "unit": "exponent", "peer": null, "ours": 1.0 },
             } })
         };
-        let picture = draw(&[line("aaaa", 5.7), line("bbbb", 2.85)]);
+        let chart = draw(&[line("aaaa", 5.7), line("bbbb", 2.85)]);
         for word in ["aaaa", "bbbb", "noise 20.0"] {
-            assert!(picture.contains(word), "{word} is missing");
+            assert!(chart.contains(word), "{word} is missing");
         }
-        assert!(!picture.contains("growth"));
+        assert!(!chart.contains("growth"));
         assert!(!draw(&[line("aaaa", 5.7)]).contains("NaN"));
     }
 }

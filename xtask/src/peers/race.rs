@@ -1,4 +1,4 @@
-//! Both sides in turn: the Python programs of benches/peers, and ours.
+//! Alternating measurements of the Python programs of benches/peers and of ours.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};
@@ -13,38 +13,38 @@ use super::rows::{Growth, Row, Source};
 use crate::shell;
 use crate::workspace::Workspace;
 
-/// Frames and stacks that a process makes for one figure: of the peer, of ours.
+/// Frames and stacks of a measurement: peer, ours.
 const FRAMES: [usize; 2] = [3, 15];
 const STACKS: [usize; 2] = [1, 3];
 
-/// Frames a process makes while another does the same: of the peer, of ours.
+/// Frames of a measurement of concurrent processes: peer, ours.
 const AT_ONCE: [usize; 2] = [6, 60];
 
-/// How long a kernel runs in one turn, seconds.
+/// Duration of a kernel measurement, seconds.
 const KERNEL_S: f64 = 0.25;
 
-/// What was found of a row: time in milliseconds, memory in MB, or an exponent.
+/// The figures of a row: time in milliseconds, memory in MB, or an exponent.
 pub(super) struct Figures {
     pub(super) peer: Option<f64>,
     pub(super) ours: f64,
 }
 
 impl Figures {
-    /// Ours over the peer's.
+    /// Returns the ratio of ours and the peer's.
     pub(super) fn ratio(&self) -> Option<f64> {
         self.peer.map(|peer| self.ours / peer)
     }
 
-    /// Medians of times in seconds.
+    /// Computes medians of times in seconds.
     fn of_times([mut peer, mut ours]: [Vec<f64>; 2]) -> Self {
         Self { peer: Some(1e3 * median(&mut peer)), ours: 1e3 * median(&mut ours) }
     }
 }
 
-/// A row's figures, or why there are none.
+/// The figures of a row, or the reason why they are missing.
 pub(super) type Found = Result<Figures, String>;
 
-/// Median CPU and wall time of one piece of work, and the peak memory of the process.
+/// Median CPU and wall time of one repetition, and the peak memory of the process.
 #[derive(Clone, Copy, Deserialize)]
 struct Measured {
     #[serde(rename = "cpu_med")]
@@ -54,23 +54,23 @@ struct Measured {
     peak_mb: f64,
 }
 
-/// Everyone who takes part.
+/// The programs that are compared.
 pub(super) struct Race {
-    /// With the packages of the peer, if they can be had.
+    /// Python with the packages of the peer, if available.
     python: Option<PathBuf>,
     scripts: PathBuf,
     scratch: PathBuf,
-    /// The example `peer_workload` of the engine, which images benches/peer.toml.
+    /// The example `peer_workload` of the engine, which renders benches/peer.toml.
     workload: PathBuf,
-    /// The works of papsynth-benches.
+    /// The program papsynth-benches.
     works: PathBuf,
-    /// Programs of kernels, the peer's and ours.
+    /// Kernel programs: peer, ours.
     kernels: Option<[Kernels; 2]>,
-    /// Whole programs that were measured already, the peer's and ours.
+    /// Cached measurements of complete programs: peer, ours.
     programs: BTreeMap<&'static str, [Vec<Measured>; 2]>,
-    /// How often both sides are measured.
+    /// Number of alternating measurements.
     turns: usize,
-    /// What there is to say below the table.
+    /// Notes below the table.
     pub(super) notes: Vec<String>,
 }
 
@@ -97,7 +97,7 @@ impl Race {
 
     pub(super) fn row(&mut self, row: &Row) -> Result<Found> {
         if self.python.is_none() && !matches!(row.source, Source::TwoThreads | Source::Growth(_)) {
-            return Ok(Err("no peer".to_owned()));
+            return Ok(Err("the peer is not installed".to_owned()));
         }
         Ok(Ok(match row.source {
             Source::Kernel(theirs, ours) => return self.kernel(theirs, ours),
@@ -121,7 +121,7 @@ impl Race {
         }))
     }
 
-    /// What is found when both sides are measured in turn.
+    /// Measures both alternately.
     fn in_turn<T>(&self, peer: impl Fn(&Self) -> Result<T>, ours: impl Fn(&Self) -> Result<T>) -> Result<[Vec<T>; 2]> {
         let mut found = [Vec::new(), Vec::new()];
         for _ in 0..self.turns {
@@ -148,7 +148,7 @@ impl Race {
         Ok(Ok(Figures::of_times(seconds)))
     }
 
-    /// Whole programs: `frame` or `stack`.
+    /// Measures complete programs: `frame` or `stack`.
     fn program(&mut self, work: &'static str) -> Result<&[Vec<Measured>; 2]> {
         if !self.programs.contains_key(work) {
             let [theirs, own] = if work == "stack" { STACKS } else { FRAMES };
@@ -164,7 +164,7 @@ impl Race {
         self.programs.get(work).context("it was just measured")
     }
 
-    /// The peer's whole program in so many processes at the same moment.
+    /// Measures the peer's program in several concurrent processes.
     fn peer(&self, processes: usize, work: &str, repetitions: usize) -> Result<Vec<Measured>> {
         let folders: Vec<PathBuf> = (0..processes).map(|k| self.scratch.join(format!("process-{k}"))).collect();
         let start = |folder: &PathBuf| {
@@ -183,18 +183,18 @@ impl Race {
         folders.iter().map(read).collect()
     }
 
-    /// A script of the peer, in a folder.
+    /// Returns a script of the peer, to run in a folder.
     fn python(&self, script: &str, folder: &Path) -> Result<Command> {
         shell::make(folder)?;
         let mut command = Command::new(self.python.as_ref().context("there is no peer")?);
-        // What Python compiles goes below the target folder, not beside the sources.
+        // Keeps compiled Python code out of the source folder.
         command.env("PYTHONPYCACHEPREFIX", self.scratch.join("bytecode"));
         command.env("NUMBA_CACHE_DIR", self.scratch.join("numba"));
         command.arg(self.scripts.join(script)).current_dir(folder);
         Ok(command)
     }
 
-    /// Seconds a frame of ours, while so many processes of so many threads run at the same moment.
+    /// Returns our seconds per frame with several concurrent processes and threads.
     fn own_frame_s(&self, processes: usize, threads: usize) -> Result<f64> {
         let frames = AT_ONCE[1] * threads;
         let start = |_| {
@@ -217,10 +217,10 @@ impl Race {
         Kernels::start(command)
     }
 
-    /// The exponent of time against size, by least squares on logarithms.
-    #[expect(clippy::disallowed_methods, reason = "a figure for people, which reaches no pixel")]
+    /// Returns the exponent of time as a function of size, by least squares of logarithms.
+    #[expect(clippy::disallowed_methods, reason = "the figure is only printed")]
     fn growth(&mut self, growth: &Growth) -> Result<f64> {
-        // A process of its own, so that the memory of large fields is given back.
+        // A separate process, so that the memory of large fields is released.
         let mut own = self.own_kernels()?;
         let (mut points, mut words) = (Vec::new(), Vec::new());
         for &size in growth.sizes {
@@ -232,7 +232,7 @@ impl Race {
             }
         }
         self.notes.push(format!(
-            "Growth with {} {}. Fitted from {} on, with as much of everything per area.",
+            "Growth with {} {}. Fitted from {} on, at constant density of objects.",
             growth.what,
             words.join(", "),
             growth.from
@@ -241,10 +241,10 @@ impl Race {
     }
 }
 
-/// A program that does the works it is asked for, line by line.
+/// A program that runs the kernels named on its standard input.
 struct Kernels {
     child: Child,
-    /// Closed to end the program.
+    /// Closing it ends the program.
     asked: Option<ChildStdin>,
     answers: BufReader<ChildStdout>,
 }
@@ -254,18 +254,20 @@ impl Kernels {
         let child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
         let mut child = child.with_context(|| format!("cannot start {}", command.get_program().display()))?;
         let (asked, answers) = (child.stdin.take(), child.stdout.take());
-        Ok(Self { child, asked, answers: BufReader::new(answers.context("its output is ours")?) })
+        Ok(Self { child, asked, answers: BufReader::new(answers.context("the output is piped")?) })
     }
 
-    /// Has a work done for about so many seconds: CPU seconds of each time, or why it cannot be done here.
+    /// Runs a kernel for about `seconds` and returns the CPU seconds of each repetition, or the reason why it is not
+    /// available.
     fn measure(&mut self, work: &str, seconds: f64) -> Result<Result<Vec<f64>, String>> {
         let asked = self.asked.as_mut().context("the program was ended")?;
-        writeln!(asked, "{work} {seconds}").with_context(|| format!("cannot ask for `{work}`"))?;
+        writeln!(asked, "{work} {seconds}").with_context(|| format!("cannot request `{work}`"))?;
         asked.flush()?;
         let mut line = String::new();
         let read = self.answers.read_line(&mut line)?;
-        ensure!(read > 0, "no answer to `{work}`: its program has ended");
-        let value: Value = serde_json::from_str(&line).with_context(|| format!("`{work}`: no JSON, but `{line}`"))?;
+        ensure!(read > 0, "no answer to `{work}`: the program has ended");
+        let value: Value =
+            serde_json::from_str(&line).with_context(|| format!("`{work}`: expected JSON, found `{line}`"))?;
         if let Some(reason) = value["missing"].as_str() {
             return Ok(Err(reason.to_owned()));
         }
@@ -276,7 +278,7 @@ impl Kernels {
 
 impl Drop for Kernels {
     fn drop(&mut self) {
-        // The end of its input ends it; whether it ended well is of no matter any more.
+        // The end of its input ends the program; its exit status is ignored.
         self.asked = None;
         let _ = self.child.wait();
     }
@@ -287,7 +289,7 @@ fn median(values: &mut [f64]) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-/// The slope of the straight line with the least squares.
+/// Returns the slope of the least-squares line.
 fn slope(points: &[[f64; 2]]) -> f64 {
     let mean = |k: usize| points.iter().map(|point| point[k]).sum::<f64>() / points.len() as f64;
     let (x, y) = (mean(0), mean(1));
@@ -306,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn a_median_lies_in_the_middle() {
+    fn the_median_is_the_central_value() {
         assert_eq!(median(&mut [9.0, 1.0, 5.0]), 5.0);
         assert!(median(&mut []).is_nan());
     }

@@ -1,55 +1,55 @@
-//! What is compared, and what is wanted.
+//! The rows of the table, with their targets.
 
 use Source::{Kernel, Memory, Program, TwoCores, TwoThreads};
 
-/// A work of the table.
+/// A row of the table.
 pub(super) struct Row {
-    /// The name by which it is asked for.
+    /// Name of the row.
     pub(super) name: &'static str,
-    /// What is done.
+    /// The work.
     pub(super) work: &'static str,
-    /// Who else does it.
+    /// The other program.
     pub(super) peer: &'static str,
-    /// Where the figures come from.
+    /// Source of the figures.
     pub(super) source: Source,
-    /// What is wanted at least: our time over the peer's, our memory in MB, an exponent.
+    /// Required: our time relative to the peer's, our memory in MB, or an exponent.
     pub(super) at_most: f64,
-    /// What is tried for.
+    /// Desired.
     pub(super) try_for: Option<f64>,
 }
 
-/// Where the figures of a row come from.
+/// Source of the figures of a row.
 #[derive(Clone, Copy)]
 pub(super) enum Source {
-    /// CPU time of a kernel: the peer's name of it, and ours.
+    /// CPU time of a kernel: its names in the peer's program and in ours.
     Kernel(&'static str, &'static str),
-    /// CPU time of a whole program: `frame` or `stack`.
+    /// CPU time of a complete program: `frame` or `stack`.
     Program(&'static str),
-    /// Peak memory of the same.
+    /// Peak memory of a complete program.
     Memory(&'static str),
-    /// Time of a frame while two processes of the peer run, and two threads of ours.
+    /// Time per frame of two processes of the peer, and of two of our threads.
     TwoCores,
-    /// Time of a frame while two processes of ours run, and two threads of ours.
+    /// Time per frame of two of our processes, and of two of our threads.
     TwoThreads,
-    /// How time grows: the exponent, fitted to works of ours.
+    /// Exponent of our time as a function of size.
     Growth(&'static Growth),
 }
 
-/// Works that differ in size alone.
+/// Kernels of different sizes.
 pub(super) struct Growth {
-    /// The first part of their names; the second is the size.
+    /// First part of the names; the second is the size.
     pub(super) kind: &'static str,
-    /// What the size counts.
+    /// Meaning of the size, for the note.
     pub(super) what: &'static str,
     pub(super) sizes: &'static [u32],
-    /// Sizes from this on count; below, fixed costs rule.
+    /// Smallest size of the fit; below, fixed costs dominate.
     pub(super) from: u32,
-    /// Pixels are the square of a side, cells are cells.
+    /// Power of the size: 2 for the width of a field, 1 for a number of cells.
     pub(super) power: f64,
 }
 
 const PIXELS: Growth =
-    Growth { kind: "pixels", what: "a side of", sizes: &[64, 256, 1024, 2048, 4096, 8192], from: 1024, power: 2.0 };
+    Growth { kind: "pixels", what: "a width of", sizes: &[64, 256, 1024, 2048, 4096, 8192], from: 1024, power: 2.0 };
 
 const CELLS: Growth =
     Growth { kind: "cells", what: "cells:", sizes: &[10, 30, 100, 300, 1000, 3000, 10_000], from: 30, power: 1.0 };
@@ -68,17 +68,23 @@ const fn growth(name: &'static str, work: &'static str, growth: &'static Growth)
     Row { name, work, peer: "-", source: Source::Growth(growth), at_most: 1.05, try_for: None }
 }
 
-/// Every row.
+/// All rows.
 pub(super) const ROWS: [Row; 19] = [
-    row("frame", "frame of 1376 x 1038, 30 cells, peer's recipe, with truth", Program("frame"), 1.0 / 20.0, 1.0 / 35.0),
-    row("stack", "its stack of 21 planes", Program("stack"), 1.0 / 16.0, 1.0 / 24.0),
+    row(
+        "frame",
+        "frame of 1376 x 1038, 30 cells, peer's recipe, with ground truth",
+        Program("frame"),
+        1.0 / 20.0,
+        1.0 / 35.0,
+    ),
+    row("stack", "stack of 21 planes of the same", Program("stack"), 1.0 / 16.0, 1.0 / 24.0),
     Row {
         peer: "two of papsim, numba",
-        ..row("two-cores", "wall time a frame, two threads against two processes", TwoCores, 1.0 / 20.0, 1.0 / 36.0)
+        ..row("two-cores", "wall time per frame, two threads, two processes", TwoCores, 1.0 / 20.0, 1.0 / 36.0)
     },
     Row {
         name: "two-threads",
-        work: "the same against two processes of ours",
+        work: "wall time per frame, two threads, two of our processes",
         peer: "two of ours",
         source: TwoThreads,
         at_most: 1.0 / 0.95,
@@ -91,18 +97,18 @@ pub(super) const ROWS: [Row; 19] = [
         1.0 / 2.0,
         1.0 / 6.0,
     ),
-    kernel("cloth-538", "sheet of 538 vertices, 60 steps; ours of sixteen at a time", NUMBA, 1.0 / 5.0, 1.0 / 11.0),
-    kernel("cloth-10000", "step of a sheet of 10 000; ours of sixteen at a time", NUMBA, 1.0 / 14.0, 1.0 / 35.0),
+    kernel("cloth-538", "sheet of 538 vertices, 60 steps; ours in batches of 16", NUMBA, 1.0 / 5.0, 1.0 / 11.0),
+    kernel("cloth-10000", "step of a sheet of 10 000; ours in batches of 16", NUMBA, 1.0 / 14.0, 1.0 / 35.0),
     kernel("blur-0.9", "Gaussian blur of a frame, sigma 0.9", "OpenCV", 0.9, 0.45),
     kernel("blur-3.6", "Gaussian blur of a frame, sigma 3.6", "OpenCV", 0.8, 0.4),
     kernel("blur-20", "Gaussian blur of a frame, sigma 20", "OpenCV", 0.1, 0.03),
-    kernel("noise", "shot and read noise of a frame; exact Poisson both", "NumPy", 1.0 / 9.0, 1.0 / 14.0),
-    kernel("nucleus", "texture of a nucleus of 40 x 40, three donors", NUMBA, 1.0 / 15.0, 1.0 / 29.0),
+    kernel("noise", "shot and read noise of a frame, exact Poisson", "NumPy", 1.0 / 9.0, 1.0 / 14.0),
+    kernel("nucleus", "texture of a nucleus of 40 x 40, three sources", NUMBA, 1.0 / 15.0, 1.0 / 29.0),
     kernel("cytoskeleton", "cytoskeleton of a cell", "papsim, SciPy", 1.0 / 13.0, 1.0 / 25.0),
     kernel("perlin", "octave of Perlin noise of a frame", "FastNoiseLite", 1.0 / 9.0, 1.0 / 45.0),
     kernel("gibson-lanni", "Gibson-Lanni, 127 x 127 x 21", "psfmodels, scalar", 1.0 / 12.0, 1.0 / 50.0),
     row("memory-frame", "peak memory, frames", Memory("frame"), 60.0, 30.0),
     row("memory-stack", "peak memory, stacks", Memory("stack"), 90.0, 40.0),
-    growth("growth-pixels", "exponent of time against pixels, default recipe", &PIXELS),
-    growth("growth-cells", "exponent of time against cells, peer's recipe", &CELLS),
+    growth("growth-pixels", "exponent of time over pixels, default recipe", &PIXELS),
+    growth("growth-cells", "exponent of time over cells, peer's recipe", &CELLS),
 ];

@@ -1,17 +1,17 @@
-//! The table.
+//! Prints the table.
 
 use super::race::{Figures, Found};
 use super::rows::{Row, Source};
 
-/// A row with what was found of it.
+/// A row and its figures.
 pub(super) type Line = (&'static Row, Found);
 
-/// How a number is written.
+/// Formats a number.
 type Text = fn(f64) -> String;
 
-const HEAD: [&str; 9] = ["name", "work", "peer", "peer's", "ours", "ratio", "at most", "try for", ""];
+const HEAD: [&str; 9] = ["name", "work", "peer", "theirs", "ours", "ratio", "required", "desired", ""];
 
-/// The whole table as text.
+/// Returns the table as text.
 pub(super) fn text(lines: &[Line]) -> String {
     let mut cells = vec![HEAD.map(str::to_owned)];
     cells.extend(lines.iter().map(|(row, found)| cells_of(row, found)));
@@ -21,7 +21,7 @@ pub(super) fn text(lines: &[Line]) -> String {
     for line in &cells {
         let mut words = String::new();
         for (column, (cell, width)) in line.iter().zip(widths).enumerate() {
-            // Words stand to the left, figures to the right.
+            // Text is left-aligned, figures right-aligned.
             words += &if (3..8).contains(&column) { format!("{cell:>width$}  ") } else { format!("{cell:<width$}  ") };
         }
         text = text + words.trim_end() + "\n";
@@ -53,7 +53,7 @@ fn cells_of(row: &Row, found: &Found) -> [String; 9] {
     ]
 }
 
-/// How far a figure got.
+/// Compares a figure with its targets.
 fn reached(row: &Row, figures: &Figures) -> &'static str {
     let figure = match row.source {
         Source::Memory(_) | Source::Growth(_) => Some(figures.ours),
@@ -61,15 +61,15 @@ fn reached(row: &Row, figures: &Figures) -> &'static str {
     };
     let within = |limit: f64| figure.is_some_and(|figure| figure <= limit);
     if row.try_for.is_some_and(within) {
-        "what is tried for"
+        "desired"
     } else if within(row.at_most) {
-        "what is wanted"
+        "required"
     } else {
-        "NOT YET"
+        "MISSED"
     }
 }
 
-/// A ratio as people say it: 1/24 or .83.
+/// Formats a ratio: 1/24 or 0.83.
 fn fraction(ratio: f64) -> String {
     match ratio {
         r if r >= 0.3 => format!("{r:.2}"),
@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ratios_read_as_people_say_them() {
+    fn ratios_are_fractions_or_decimals() {
         assert_eq!(
             [0.9, 0.5, 1.0 / 24.0, 0.01, 0.1, 1.0 / 0.95].map(fraction),
             ["0.90", "0.50", "1/24", "1/100", "1/10", "1.05"]
@@ -104,11 +104,11 @@ mod tests {
     }
 
     #[test]
-    fn a_row_says_how_far_it_got() {
+    fn rows_state_the_target_that_is_reached() {
         let frame = &ROWS[0];
         let at = |ours| reached(frame, &Figures { peer: Some(100.0), ours });
-        assert_eq!([at(2.0), at(4.0), at(6.0)], ["what is tried for", "what is wanted", "NOT YET"]);
-        let text = text(&[(frame, Err("no peer".to_owned()))]);
-        assert!(text.contains("1/20") && text.contains("skipped: no peer"), "{text}");
+        assert_eq!([at(2.0), at(4.0), at(6.0)], ["desired", "required", "MISSED"]);
+        let text = text(&[(frame, Err("the peer is not installed".to_owned()))]);
+        assert!(text.contains("1/20") && text.contains("skipped: the peer is not installed"), "{text}");
     }
 }

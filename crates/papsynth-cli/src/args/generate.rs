@@ -20,10 +20,10 @@ use crate::task::TaskArgs;
 Examples:
   papsynth generate --out fields --frames 8
   papsynth generate my.toml --out fields --frames 1000 --seed 7
-  papsynth generate --preset dense --out dense --range 500..1000     the second half, on another machine
+  papsynth generate --preset dense --out dense --range 500..1000     frames 500 to 999
   papsynth generate --out sets --frames 200 --format folder,cellpose,yolo-seg
   papsynth generate my.toml --out many --frames 100000 --task 3/20    task 3 of 0 to 19
-  papsynth generate my.toml --out s3://bucket/many --frames 100000    keys from AWS_ACCESS_KEY_ID and related variables
+  papsynth generate my.toml --out s3://bucket/many --frames 100000    keys as for AWS tools
   papsynth generate wide.toml --out wide --frames 20 --max-memory 2GiB
   papsynth generate --out timed --frames 20 --threads 1 --profile     time of each stage
   papsynth generate --out stacks --frames 4 --set focus.planes=21 --set focus.step_um=0.5

@@ -21,8 +21,8 @@ Examples:
   papsynth judge slides fields --pixel-um 0.33 --group N --out report      only negative fields
   papsynth judge slides other-slides --pixel-um 0.33 --synthetic-pixel-um 0.25 --out report
 
-REAL and SYNTHETIC are each a data set of `papsynth generate`, or a folder of PNG or TIFF images of
-8 or 16 bits; of colour images the green channel is used. A folder may also hold:
+REAL and SYNTHETIC are each a data set of `papsynth generate`, or a folder of PNG, JPEG or TIFF images
+of 8 or 16 bits; of colour images the green channel is used. A folder may also hold:
   NAME.csv     points in the nuclei of NAME.png, one `y,x` per line
   masks/       masks or label images of nuclei, with the names of the images
   frames.csv   the group of each image, with the columns `frame,grade`
@@ -61,7 +61,7 @@ pub(crate) struct Judge {
     /// Number of threads; does not change the report [default: the number of cores]
     #[arg(long, value_name = "N", value_parser = integer(1, 1024_u16))]
     pub(crate) threads: Option<u16>,
-    /// Print errors only
+    /// Print no progress
     #[arg(long, short)]
     pub(crate) quiet: bool,
 }
@@ -79,9 +79,10 @@ Examples:
   papsynth match slides --find-pixel --quick --out mine.toml
   papsynth generate mine.toml --out fields --frames 20
 
-REAL is a folder as for `papsynth judge`: images of one size, and masks of nuclei if available. Without
-masks, nuclei are found automatically in real and simulated fields; points are not used, because they
-rarely mark all nuclei. Use 5 to 10 fields; one field does not show the variation between fields.
+REAL is a folder as for `papsynth judge`: images of one size, and masks of nuclei if available.
+Without masks, nuclei are found automatically in real and simulated fields; points are not used,
+because they rarely mark all nuclei. Use 5 to 10 fields; one field does not show the variation
+between fields.
 
 The time grows with the number of simulations: the progress line shows the time left.")]
 pub(crate) struct Match {
@@ -94,8 +95,8 @@ pub(crate) struct Match {
     /// Replace any existing file
     #[arg(long)]
     pub(crate) force: bool,
-    /// Built-in recipe to begin with [default: lbc]
-    #[arg(long, value_name = "NAME", value_parser = preset_parser(), default_value = Preset::Lbc.name(), hide_default_value = true)]
+    /// Built-in recipe to begin with; `papsynth init --list` prints all [default: lbc]
+    #[arg(long, value_name = "NAME", value_parser = preset_parser(), default_value = Preset::Lbc.name(), hide_default_value = true, hide_possible_values = true)]
     pub(crate) preset: Preset,
     /// Pixel size, in micrometres [default: as recorded]
     #[arg(long, value_name = "UM", value_parser = parse_pixel)]

@@ -14,14 +14,16 @@ use super::values::parse_pixel;
 #[command(group = ArgGroup::new("material").required(true).multiple(true)
     .args(["nuclei", "nucleus_outlines", "outlines", "labels"]), after_help = "\
 Examples:
-  papsynth learn --class intermediate --nuclei nuclei --outlines cells.csv --pixel-um 0.25 --out mine.json
+  papsynth learn --class intermediate --nuclei nuclei --outlines cells.csv --pixel-um 0.25 \\
+      --out mine.json
   papsynth learn --class high-grade --nuclei hsil/crops --masks hsil/masks --pixel-um 0.25 \\
       --base mine.json --numbers-only --out mine.json
-  papsynth learn --class parabasal --like intermediate --labels fields --pixel-um 0.33 --out mine.json
+  papsynth learn --class parabasal --like intermediate --labels fields --pixel-um 0.33 \\
+      --out mine.json
 
-Images are grey PNG or TIFF files; masks and label images are 0 outside the objects. An outline file is
-a CSV file with the columns outline, k, x_px, y_px: name of the outline, index of the point from 0, and
-its position in pixels.")]
+Images are grey PNG, JPEG or TIFF files; masks and label images are 0 outside the objects. An
+outline file is a CSV file with the columns outline, k, x_px, y_px: name of the outline, index of the
+point from 0, and its position in pixels.")]
 pub(crate) struct Learn {
     /// Class to learn: a new class, or a class of the base model to replace
     #[arg(long, value_name = "NAME", value_parser = parse_class)]

@@ -60,13 +60,16 @@ use {MissingFeature as Study, MissingFeature as View};
     max_term_width = 100,
     after_help = "\
 Examples:
-  papsynth generate --out fields --frames 8            generate 8 labelled fields of the default recipe
-  papsynth init --preset dense --out dense.toml        write a commented recipe to edit
-  papsynth preview dense.toml                          show one field next to its ground truth
+  papsynth generate --out fields --frames 8       generate 8 fields of the default recipe
+  papsynth init --preset dense --out dense.toml   write a commented recipe to edit
+  papsynth preview dense.toml                     show one field next to its ground truth
   papsynth generate dense.toml --out dense --frames 100
 
-Exit codes: 0 success; 2 error in usage, recipe or input; 74 input/output error, such as a full disk;
-130 interrupted: run the same command again to continue."
+Exit codes:
+    0  success
+    2  error in usage, recipe or input
+   74  input/output error, such as a full disk
+  130  interrupted: run the same command again to continue"
 )]
 pub(crate) struct Cli {
     /// The subcommand.

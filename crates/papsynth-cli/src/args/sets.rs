@@ -149,10 +149,12 @@ pub(crate) struct Plan {
 #[command(after_help = "\
 Examples:
   papsynth submit slurm --tasks 50 -- my.toml --out many --frames 100000 > job.sh
-  papsynth submit kubernetes --tasks 50 --image registry.example/papsynth:0.1 -- --out /data/many --frames 100000 > job.yaml
+  papsynth submit kubernetes --tasks 50 --image registry.example/papsynth:0.1 \\
+      -- --out /data/many --frames 100000 > job.yaml
 
-Tasks that fail with an input/output error (exit code 74) are run again; tasks that fail with an error in
-usage, recipe or input (2) are not. When all tasks are done, run papsynth status, then papsynth merge.")]
+Tasks that fail with an input/output error (exit code 74) are run again; tasks that fail with an
+error in usage, recipe or input (2) are not. When all tasks are done, run papsynth status, then
+papsynth merge.")]
 pub(crate) struct Submit {
     /// Scheduler of the cluster
     #[arg(value_name = "SCHEDULER", value_parser = ["slurm", "kubernetes"])]
@@ -214,8 +216,10 @@ pub(crate) struct Rerender {
 #[command(after_help = "\
 Examples:
   papsynth sweep --out sweep --frames 8 --vary focus.centre_um=-4,-2,0,2,4
-  papsynth sweep mine.toml --out sweep --frames 20 --vary debris.bacilli.clusters=0,8,32 --vary camera.full_well_e=2000,18000
-  papsynth sweep --out sweep --frames 4 --vary stain.slide_nucleus=0.5,1,2 --vary background.illumination.falloff_x=0,0.1,0.3")]
+  papsynth sweep mine.toml --out sweep --frames 20 --vary debris.bacilli.clusters=0,8,32 \\
+      --vary camera.full_well_e=2000,18000
+  papsynth sweep --out sweep --frames 4 --vary stain.slide_nucleus=0.5,1,2 \\
+      --vary background.illumination.x2=0,0.1,0.3")]
 pub(crate) struct Sweep {
     #[command(flatten)]
     pub(crate) engine: EngineArgs,

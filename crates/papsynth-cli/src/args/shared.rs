@@ -17,8 +17,8 @@ pub(crate) struct RecipeArgs {
     /// Recipe in TOML, as printed by `papsynth init`; `-` reads standard input [default: the preset `lbc`]
     #[arg(value_name = "RECIPE")]
     pub(crate) recipe: Option<PathBuf>,
-    /// Built-in recipe instead of a file
-    #[arg(long, value_name = "NAME", value_parser = preset_parser(), conflicts_with = "recipe")]
+    /// Built-in recipe instead of a file; `papsynth init --list` prints all
+    #[arg(long, value_name = "NAME", value_parser = preset_parser(), hide_possible_values = true, conflicts_with = "recipe")]
     pub(crate) preset: Option<Preset>,
     /// File with sections that replace those of the recipe, such as the output of `papsynth calibrate`; repeatable
     #[arg(long, value_name = "FILE")]

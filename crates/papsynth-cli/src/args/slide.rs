@@ -16,13 +16,15 @@ use crate::task::TaskArgs;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  papsynth slide make --out slide --size 8192,8192 --set scan.deposit.x_um=1000 --set scan.deposit.y_um=1000
-  papsynth slide tile --at 30000,28000 --size 1024,768 --out tile.png    one region only
-  papsynth slide make --out big --task 0/16                              task 0 of 16; after all tasks:
+  papsynth slide make --out slide --size 8192,8192 --set scan.deposit.x_um=1000 \\
+      --set scan.deposit.y_um=1000
+  papsynth slide tile --at 30000,28000 --size 1024,768 --out tile.png
+  papsynth slide make --out big --task 0/16   task 0 of 16; after all tasks:
   papsynth slide finalize big
   papsynth verify big
 
-A slide is an OME-Zarr 0.5 image with labels, and a table and a GeoJSON file of objects per shard.")]
+A slide is an OME-Zarr 0.5 image with labels, and a table and a GeoJSON file of objects per
+shard.")]
 pub(crate) struct Slide {
     /// The subcommand.
     #[command(subcommand)]
@@ -44,9 +46,10 @@ pub(crate) enum SlideVerb {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  papsynth slide make --out slide --size 8192,8192 --set scan.deposit.x_um=1000 --set scan.deposit.y_um=1000
-  papsynth slide make mine.toml --out big --task 0/16          task 0 of 16
-  papsynth slide make mine.toml --out big --verify             check present files and repair invalid ones")]
+  papsynth slide make --out slide --size 8192,8192 --set scan.deposit.x_um=1000 \\
+      --set scan.deposit.y_um=1000
+  papsynth slide make mine.toml --out big --task 0/16   task 0 of 16
+  papsynth slide make mine.toml --out big --verify      check and repair present files")]
 pub(crate) struct SlideMake {
     #[command(flatten)]
     pub(crate) engine: EngineArgs,

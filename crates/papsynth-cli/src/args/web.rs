@@ -17,12 +17,12 @@ use super::values::{integer, named, parse_pixel};
 Examples:
   papsynth study real fields --out results --subject ann         120 patches, about 10 minutes
   papsynth study real fields --out results --subject ben --open
-  papsynth study real fields --out pairs --design 2afc           two patches at a time: which one is real?
+  papsynth study real fields --out pairs --design 2afc           two patches at a time
   papsynth study real fields --out try --trials 10 --exposure-ms 500
   papsynth study real fields --pixel-um 0.33                     resample to equal pixel sizes
-  papsynth study --results results                               results of all subjects, as Table 1 of the paper
+  papsynth study --results results                               Table 1 of the paper
 
-REAL and SYNTHETIC are folders of PNG or TIFF images, data sets of papsynth, or folders of several
+REAL and SYNTHETIC are folders of PNG, JPEG or TIFF images, data sets of papsynth, or folders of several
 data sets with different settings; results are then also listed by the settings that differ, and by
 defocus, stain and density. Of colour images the green channel is shown, of stacks the centre plane.
 
@@ -47,8 +47,8 @@ pub(crate) struct Study {
     #[arg(long, value_name = "NAME", default_value_t = StudyParams::default().subject)]
     pub(crate) subject: String,
     /// Design of a trial: one patch, real or not (as in the paper), or two patches, which is real
-    #[arg(long, value_name = "NAME", value_parser = named(Task::ALL, Task::name), default_value = StudyParams::default().task.name())]
-    pub(crate) design: Task,
+    #[arg(long, value_name = "NAME", value_parser = named(TrialDesign::ALL, TrialDesign::name), default_value = StudyParams::default().task.name())]
+    pub(crate) design: TrialDesign,
     /// Number of scored trials
     #[arg(long, value_name = "N", default_value_t = StudyParams::default().trials)]
     pub(crate) trials: usize,
@@ -102,7 +102,7 @@ pub(crate) struct Study {
 Examples:
   papsynth view fields
   papsynth view stacks --open            open the browser
-  papsynth view slide --port 8080        a slide of `papsynth slide make` (needs a build with --features zarr)
+  papsynth view slide --port 8080        a slide; needs a build with --features zarr
 
 Drag to pan, turn the wheel to zoom, turn it with Shift to focus, click to identify an object. The
 address in the browser stores image, position, focus and labels. Press Ctrl-C to quit.")]

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 
 use ccd_noise::Error::{NoDark, Saturated};
 use optics_psf::Error::FocusAtStackEnd;
-use papsynth_calibrate::{Camera, Edge, EdgeAt, Error, Flats, Focus, FocusParams, Frame, Instrument, LightLevel, NucleiAt};
+use papsynth_calibrate::{
+    Camera, Edge, EdgeAt, Error, Flats, Focus, FocusParams, Frame, Instrument, LightLevel, NucleiAt,
+};
 use papsynth_dataset::read::{GreyImage, Limits, Stack, image_files, natural_order};
 
 use crate::args::Calibrate;
@@ -16,8 +18,13 @@ const DARK: &str = "dark";
 /// Frames per level of light.
 const PAIR: usize = 2;
 
+/// Limits on the images. JPEG is an error, because its compression changes noise and edges.
+fn lossless() -> Limits {
+    Limits { allow_lossy: false, ..Limits::default() }
+}
+
 pub(super) fn focus(args: &Calibrate, instrument: Option<&Instrument>) -> Result<Focus, ExitError> {
-    let stack = Stack::read(&args.stack, &Limits::default())?;
+    let stack = Stack::read(&args.stack, &lossless())?;
     let planes: Vec<&[f32]> = stack.planes.iter().map(Vec::as_slice).collect();
     let nuclei = if args.window.is_empty() { NucleiAt::Detected } else { NucleiAt::Windows(args.window.clone()) };
     let params = FocusParams { nuclei, step_um: args.step_um, instrument: instrument.cloned() };
@@ -45,7 +52,7 @@ pub(super) fn focus(args: &Calibrate, instrument: Option<&Instrument>) -> Result
 
 /// Measures `--edge`. Also returns the distance from the edge and the grey level of each pixel.
 pub(super) fn edge(args: &Calibrate, path: &Path) -> Result<(Edge, Vec<[f64; 2]>), ExitError> {
-    let image = Stack::read(&[path.to_owned()], &Limits::default())?;
+    let image = Stack::read(&[path.to_owned()], &lossless())?;
     let name = path.display();
     let [pixels] = image.planes.as_slice() else {
         let message = format!("--edge {name}: {} images; expected 1", image.planes.len());
@@ -72,8 +79,7 @@ pub(super) fn camera(args: &Calibrate, folder: &Path) -> Result<Camera, ExitErro
     let mut flats = Flats::new(bits).map_err(|error| ExitError::with_help(format!("--bits: {error}"), "8 to 16"))?;
     for Exposure { name, files, light } in &exposures {
         // Memory holds one level at a time.
-        let images =
-            files.iter().map(|file| GreyImage::read(file, &Limits::default())).collect::<Result<Vec<_>, _>>()?;
+        let images = files.iter().map(|file| GreyImage::read(file, &lossless())).collect::<Result<Vec<_>, _>>()?;
         let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
         let frames: Vec<Frame> = (names.iter().zip(&images))
             .map(|(name, image)| Frame { name, grey: &image.grey, width: image.width })
@@ -134,7 +140,8 @@ fn exposures(folder: &Path, dark: Option<&Path>) -> Result<Vec<Exposure>, ExitEr
             ));
         }
     };
-    let mut exposures = vec![Exposure { name: dark.display().to_string(), files: files(&dark)?, light: LightLevel::Dark }];
+    let mut exposures =
+        vec![Exposure { name: dark.display().to_string(), files: files(&dark)?, light: LightLevel::Dark }];
     for path in &folders {
         exposures.push(Exposure { name: path.display().to_string(), files: files(path)?, light: LightLevel::Unknown });
     }
@@ -177,7 +184,7 @@ fn depth(args: &Calibrate, first: &Path, folder: &Path) -> Result<u32, ExitError
     if let Some(bits) = args.bits {
         return Ok(bits);
     }
-    if GreyImage::read(first, &Limits::default())?.white == u16::from(u8::MAX) {
+    if GreyImage::read(first, &lossless())?.white == u16::from(u8::MAX) {
         return Ok(u8::BITS);
     }
     let message = format!("--flat {}: the bit depth of the camera is unknown for 16-bit files", folder.display());

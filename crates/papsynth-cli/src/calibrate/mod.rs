@@ -19,7 +19,7 @@ const RECORD: &str = "calibration.json";
 
 /// Output files, and the beginnings by which older ones are recognized.
 const PLOT: Kind = Kind::Text(plot::BEGINS, "a plot of papsynth calibrate");
-const RECIPE: Kind = Kind::Text(RECIPE_BEGINS, "a recipe of papsynth calibrate");
+const RECIPE: Kind = Kind::Text(RECIPE_PREFIX, "a recipe of papsynth calibrate");
 const FILES: [(&str, Kind); 7] = [
     ("focus.svg", PLOT),
     ("edge.svg", PLOT),
@@ -27,7 +27,7 @@ const FILES: [(&str, Kind); 7] = [
     ("optics.toml", RECIPE),
     ("optics-gaussian.toml", RECIPE),
     ("camera.toml", RECIPE),
-    (RECORD, Kind::Text(Calibration::BEGINS, "a calibration of papsynth")),
+    (RECORD, Kind::Text(Calibration::PREFIX, "a calibration of papsynth")),
 ];
 
 pub(crate) fn run(args: &Calibrate) -> Result<(), ExitError> {

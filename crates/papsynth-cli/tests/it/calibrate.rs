@@ -331,7 +331,11 @@ fn invalid_flats_are_rejected() {
     for name in PAIR {
         write_grey16(bench.path("sizes/10ms").join(name), &[900; 64 * 32], 64);
     }
-    rejected(&bench, "--flat sizes --dark darks --bits 12", &["10ms", "found 64 x 32 pixels, expected 128 x 128", "same size"]);
+    rejected(
+        &bench,
+        "--flat sizes --dark darks --bits 12",
+        &["10ms", "found 64 x 32 pixels, expected 128 x 128", "same size"],
+    );
     rejected(&bench, "--flat sizes --bits 12", &["--flat sizes: no dark frames", "--dark"]);
     fs::remove_dir_all(bench.path("sizes/10ms")).unwrap();
     rejected(&bench, "--flat sizes --dark darks", &["bit depth of the camera is unknown", "--bits"]);
@@ -399,7 +403,7 @@ fn invalid_stacks_and_edges_are_rejected() {
     rejected(&bench, "--edge even.tif", &["no straight edge found", "--line"]);
     rejected(&bench, "--edge even.tif --line 50,50,80,50", &["holds no edge"]);
     fs::write(bench.path("text.tif"), "no image").unwrap();
-    rejected(&bench, "--edge text.tif", &["text.tif: is neither a PNG nor a TIFF"]);
+    rejected(&bench, "--edge text.tif", &["text.tif: is not a PNG, JPEG or TIFF"]);
 }
 
 #[test]

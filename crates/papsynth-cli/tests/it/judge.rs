@@ -6,8 +6,7 @@ use std::fs;
 use crate::support::Bench;
 
 /// Small fields with nuclei, one per slide.
-const FIELD: &str =
-    "--set field.width_px=420 --set field.height_px=320 --set field.pixel_um=0.33 --set slide.fields_per_slide=1 --quiet";
+const FIELD: &str = "--set field.width_px=420 --set field.height_px=320 --set field.pixel_um=0.33 --set slide.fields_per_slide=1 --quiet";
 const CELLS: &str = "--set cells.intermediate.count=5 --set cells.superficial.count=2 \
     --set cells.parabasal.count=0 --set cells.metaplastic.count=0";
 
@@ -165,11 +164,11 @@ fn invalid_input_of_a_judge_is_rejected_and_no_file_is_written() {
     bench.good(&format!("generate --out damaged --frames 2 {FIELD} {CELLS}"));
     fs::write(bench.path("damaged/images/000001.png"), "x").unwrap();
     for (words, wanted) in [
-        ("judge good empty --pixel-um 0.3", "empty: holds no PNG or TIFF file"),
+        ("judge good empty --pixel-um 0.3", "empty: the folder has no PNG, JPEG or TIFF file"),
         ("judge good missing --pixel-um 0.3", "missing: there is no such folder"),
         ("judge good good", "neither folder records its pixel size"),
         ("judge few good --pixel-um 0.3", "few: 1 field; at least 2 are needed"),
-        ("judge good flat --pixel-um 0.3", "is the same everywhere"),
+        ("judge good flat --pixel-um 0.3", "is constant"),
         ("judge sizes sizes --pixel-um 0.3", "the mask is 64 x 40, its image 64 x 48"),
         ("judge good broken --pixel-um 0.3", "b.png"),
         ("judge grades good --pixel-um 0.3 --group H", "grades: no field of group H"),

@@ -19,12 +19,12 @@ fn the_recipe_of_a_match_generates_fields() {
     let outcome = bench.good("match real --out mine.toml --report mine.json --simulations 90 --seed 1 --threads 2");
     assert!(outcome.out.starts_with("3 fields, 3 windows, "), "{}", outcome.out);
     assert!(outcome.out.ends_with("\nmine.toml: use it with papsynth generate mine.toml\n"), "{}", outcome.out);
-    assert!(outcome.err.contains("recipes simulated (30 of 30)"), "{}", outcome.err);
+    assert!(outcome.err.contains("126 of 126"), "{}", outcome.err);
     let toml = fs::read_to_string(bench.path("mine.toml")).unwrap();
     assert!(toml.starts_with("# Matched to 3 fields: ") && toml.contains("# measured: "), "{toml}");
     let report: serde_json::Value = serde_json::from_slice(&fs::read(bench.path("mine.json")).unwrap()).unwrap();
     assert_eq!(report["match_report"], 1);
-    let answers = report["fit"]["answers"].as_array().unwrap();
+    let answers = report["fit"]["parameters"].as_array().unwrap();
     let level = answers.iter().find(|a| a["parameter"] == "level").unwrap();
     assert!((level["value"].as_f64().unwrap() - 0.8).abs() < 0.03, "{level}");
     assert!(report["fit"]["distance"]["after"].as_f64().unwrap() > 0.0);

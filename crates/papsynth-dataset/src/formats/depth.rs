@@ -29,7 +29,8 @@ pub(crate) fn to_training(levels: &[u16], bits: u32) -> Cow<'_, [u16]> {
     levels.iter().map(scaled).collect::<Vec<_>>().into()
 }
 
-/// Scales an 8-bit image of a deeper camera back to the camera's range. [`to_training`] gives the same 8-bit levels again.
+/// Scales an 8-bit image of a deeper camera back to the camera's range. [`to_training`] gives the same 8-bit levels
+/// again.
 pub(crate) fn to_camera(page: LevelImage, bits: u32) -> LevelImage {
     if page.white != u16::from(u8::MAX) || bits <= TRAINING_BITS {
         return page;

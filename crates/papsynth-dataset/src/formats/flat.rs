@@ -1,7 +1,7 @@
 //! Formats with one label per pixel, with a folder for cytoplasm and one for nuclei: `cellpose` and `stardist`.
 //!
-//! `cellpose` has `NAME.tif` and `NAME_masks.tif` in one folder. Cellpose trains on every image that does not end in `_masks`, so
-//! the two groups need separate folders. `stardist` has `images/NAME.tif` and `masks/NAME.tif`.
+//! `cellpose` has `NAME.tif` and `NAME_masks.tif` in one folder. Cellpose trains on every image that does not end in
+//! `_masks`, so the two groups need separate folders. `stardist` has `images/NAME.tif` and `masks/NAME.tif`.
 
 use papsynth::truth::Group;
 

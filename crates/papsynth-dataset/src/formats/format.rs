@@ -139,8 +139,8 @@ const MOST_FRAMES_PER_SHARD: u64 = 1_000_000_000;
 pub struct Layout {
     /// The formats, in the order of [`Format::ALL`], without duplicates; at least one.
     pub formats: Vec<Format>,
-    /// Number of frames of a shard, at least 1. Frames of a shard are written and recorded together. The first frame of shard *n*
-    /// has the index *n* times this number.
+    /// Number of frames of a shard, at least 1. Frames of a shard are written and recorded together. The first frame of
+    /// shard *n* has the index *n* times this number.
     pub frames_per_shard: u64,
     /// Which label a pixel gets where objects overlap, in formats with one label per pixel.
     pub flatten: Flatten,
@@ -203,7 +203,8 @@ impl Layout {
         self.frames_per_shard == 1
     }
 
-    /// Returns the feature that the layout needs and this build does not have, and the part of the layout that needs it.
+    /// Returns the feature that the layout needs and this build does not have, and the part of the layout that needs
+    /// it.
     pub(crate) fn needs(&self) -> Option<(&'static str, String)> {
         let format = self.formats.iter().find_map(|format| Some((format.needs()?, format.title())));
         let table =

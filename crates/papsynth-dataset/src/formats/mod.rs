@@ -1,8 +1,8 @@
 //! The formats of a data set, each in a module.
 //!
-//! The writer of a format receives every plane when it is ready and, at the end of a frame, the [`Field`]: image and ground truth.
-//! Its files are valid when the shard is recorded. All formats are derived from the COCO documents in `shards/`, which every data set
-//! has.
+//! The writer of a format receives every plane when it is ready and, at the end of a frame, the [`Field`]: image and
+//! ground truth. Its files are valid when the shard is recorded. All formats are derived from the COCO documents in
+//! `shards/`, which every data set has.
 
 mod depth;
 mod flat;
@@ -55,8 +55,8 @@ impl Format {
         })
     }
 
-    /// Checks the files of a frame against the ground truth. Frames of a tar file are read in order. Parquet files are checked only by
-    /// their hash.
+    /// Checks the files of a frame against the ground truth. Frames of a tar file are read in order. Parquet files are
+    /// checked only by their hash.
     pub(crate) fn check(self, written: &Written, tar: Option<&mut Tar>) -> Result<(), Error> {
         match self {
             Self::Folder => folder::check(written),
@@ -120,7 +120,8 @@ impl Layout {
         (image, frame.is_stack().then(|| sharp.next()).flatten())
     }
 
-    /// Returns a format with the images of frames, or with all planes of stacks; one with the bit depth of the camera if there is one.
+    /// Returns a format with the images of frames, or with all planes of stacks; one with the bit depth of the camera
+    /// if there is one.
     pub(crate) fn best_format(&self, with_planes: bool) -> Option<Format> {
         let formats = self.formats.iter().copied().filter(|format| !with_planes || format.has_planes());
         formats.min_by_key(|format| (format.needs().is_some(), format.depth()))

@@ -92,7 +92,8 @@ pub(crate) const ZARR_GROUP: &str = ".ome.zarr";
 /// Dataset card of the format `huggingface`, with the files of each split.
 pub(crate) const HUGGINGFACE_CARD: &str = "huggingface/README.md";
 
-/// Returns the file with the frames of a shard in a split. The name has no total number, because shards are written in any order.
+/// Returns the file with the frames of a shard in a split. The name has no total number, because shards are written in
+/// any order.
 pub(crate) fn huggingface_file(split: Split, shard: u64) -> String {
     format!("huggingface/data/{}-{shard:06}.parquet", huggingface_split(split))
 }

@@ -1,5 +1,5 @@
-//! Images and labels as TIFF with OME-XML; and `ome-tiff`: an OME-TIFF for the image of each frame, and one for each group of labels
-//! in layers without overlap.
+//! Images and labels as TIFF with OME-XML; and `ome-tiff`: an OME-TIFF for the image of each frame, and one for each
+//! group of labels in layers without overlap.
 
 use std::io::{self, Cursor};
 

@@ -8,8 +8,8 @@ use std::io::Cursor;
 use papsynth::Plane;
 use papsynth::truth::Group;
 use papsynth_zarr::{
-    Channel, Form, Image, Kind, Labels, Pyramid, Sample, Shard, ShardEncoder, ShardReader, Space, Tiling, halved,
-    halved_labels, levels_until, shard_bytes,
+    Channel, Coordinates, DataType, Image, Labels, Pyramid, PyramidShape, Sample, Shard, ShardEncoder, ShardReader,
+    Tiling, halved, halved_labels, levels_until, shard_bytes,
 };
 use serde_json::{Map, Value, json};
 
@@ -53,9 +53,9 @@ impl Images {
 }
 
 /// Returns the arrays of an image or label image of a frame.
-fn pyramid(frame: &FrameSummary, kind: Kind, [channels, planes]: [Option<usize>; 2]) -> Result<Pyramid, Error> {
+fn pyramid(frame: &FrameSummary, kind: DataType, [channels, planes]: [Option<usize>; 2]) -> Result<Pyramid, Error> {
     let [width, height] = [frame.width, frame.height];
-    let form = Form {
+    let form = PyramidShape {
         kind,
         channels,
         planes,
@@ -69,7 +69,7 @@ fn pyramid(frame: &FrameSummary, kind: Kind, [channels, planes]: [Option<usize>;
 
 fn image_pyramid(frame: &FrameSummary) -> Result<Pyramid, Error> {
     let many = |count: usize| (count > 1).then_some(count);
-    let kind = if frame.bits <= 8 { Kind::U8 } else { Kind::U16 };
+    let kind = if frame.bits <= 8 { DataType::U8 } else { DataType::U16 };
     pyramid(frame, kind, [many(frame.channels), many(frame.planes_um.len())])
 }
 
@@ -82,7 +82,7 @@ fn label_layers(field: &Field) -> Result<Vec<Layer>, Error> {
     let mut found = Vec::new();
     for group in Group::ALL {
         let pages = layers(field.truth, group);
-        let kind = if pages.iter().all(|ids| fits_16_bits(ids)) { Kind::U16 } else { Kind::U32 };
+        let kind = if pages.iter().all(|ids| fits_16_bits(ids)) { DataType::U16 } else { DataType::U32 };
         for (number, ids) in pages.into_iter().enumerate() {
             let shown: BTreeSet<u32> = ids.iter().copied().filter(|&id| id > 0).collect();
             let labels = Labels {
@@ -138,7 +138,11 @@ fn documents(seed: u64, frame: &FrameSummary, labels: Vec<Labels>) -> Result<Vec
     let image = Image {
         name: numbered(frame.index),
         pyramid: image_pyramid(frame)?,
-        space: Space { pixel_um: frame.pixel_um, step_um, first_um: planes.first().copied().unwrap_or(0.0) },
+        coordinates: Coordinates {
+            pixel_um: frame.pixel_um,
+            step_um,
+            first_um: planes.first().copied().unwrap_or(0.0),
+        },
         channels: channels(frame.channels, frame.bits),
         plane: planes.len() / 2,
         labels,
@@ -223,7 +227,7 @@ fn label_shards(labels: &Labels, mut ids: Vec<u32>) -> Result<Vec<(String, Vec<u
     let mut shards = Vec::new();
     for (level, array) in labels.pyramid.levels().iter().enumerate() {
         let bytes = match array.kind() {
-            Kind::U16 => shard_bytes(array, Shard::default(), &small(&ids))?,
+            DataType::U16 => shard_bytes(array, Shard::default(), &small(&ids))?,
             _ => shard_bytes(array, Shard::default(), &ids)?,
         };
         shards.push((shard_file(level, array), bytes));
@@ -290,7 +294,7 @@ fn are_labels(written: &Written, group: &str, labels: &Labels, mut ids: Vec<u32>
 /// Reads the shard of an array with values of any type.
 struct Reader<'a> {
     shard: ShardReader<Cursor<&'a [u8]>>,
-    kind: Kind,
+    kind: DataType,
 }
 
 impl<'a> Reader<'a> {
@@ -301,8 +305,8 @@ impl<'a> Reader<'a> {
 
     fn plane(&mut self, channel: usize, plane: usize) -> Result<Vec<u32>, Problem> {
         let values = match self.kind {
-            Kind::U8 => self.shard.plane::<u8>(channel, plane).map(|v| v.into_iter().map(u32::from).collect()),
-            Kind::U16 => self.shard.plane::<u16>(channel, plane).map(|v| v.into_iter().map(u32::from).collect()),
+            DataType::U8 => self.shard.plane::<u8>(channel, plane).map(|v| v.into_iter().map(u32::from).collect()),
+            DataType::U16 => self.shard.plane::<u16>(channel, plane).map(|v| v.into_iter().map(u32::from).collect()),
             _ => self.shard.plane(channel, plane),
         };
         values.map_err(broken)

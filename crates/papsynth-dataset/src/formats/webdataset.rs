@@ -1,6 +1,6 @@
-//! `webdataset`: tar files of many frames. The files of a frame are consecutive and have the same name up to the first dot: `json`
-//! (ground truth as COCO, and splits), `png` or, for a stack, `ome.tif` and `all-in-focus.png` (8 bits), `cytoplasm.png` and
-//! `nucleus.png` (labels of 16 bits).
+//! `webdataset`: tar files of many frames. The files of a frame are consecutive and have the same name up to the first
+//! dot: `json` (ground truth as COCO, and splits), `png` or, for a stack, `ome.tif` and `all-in-focus.png` (8 bits),
+//! `cytoplasm.png` and `nucleus.png` (labels of 16 bits).
 
 use std::cell::RefCell;
 use std::fs::File;

@@ -13,10 +13,16 @@ use crate::files::Folder;
 use crate::read::{self, LevelImage, Limits};
 
 /// Limits on the files of one frame.
-pub(crate) const LIMITS: Limits =
-    Limits { max_side_px: 1 << 15, max_pixels: 1 << 30, max_file_bytes: 1 << 32, max_regions: 1 << 20 };
+pub(crate) const LIMITS: Limits = Limits {
+    max_side_px: 1 << 15,
+    max_pixels: 1 << 30,
+    max_file_bytes: 1 << 32,
+    max_regions: 1 << 20,
+    allow_lossy: false,
+};
 
-/// Returns the levels of a page with the channels of the frame. A colour image in which all pixels are grey is read as grey.
+/// Returns the levels of a page with the channels of the frame. A colour image in which all pixels are grey is read as
+/// grey.
 pub(crate) fn levels(page: LevelImage, channels: usize) -> Vec<u16> {
     match channels / page.channels.max(1) {
         3 => page.levels.iter().flat_map(|&level| [level; 3]).collect(),

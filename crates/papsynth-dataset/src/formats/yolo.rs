@@ -1,4 +1,5 @@
-//! `yolo-seg`: for each object a line with its class and the corners of its complete outline, as fractions of width and height.
+//! `yolo-seg`: for each object a line with its class and the corners of its complete outline, as fractions of width and
+//! height.
 //!
 //! Separate parts and holes are joined by seams of zero width. Filled by the even-odd rule, the polygon is the mask.
 
@@ -63,9 +64,9 @@ pub(super) fn write(field: &Field, files: &mut Files) -> Result<(), Error> {
 
 /// Returns `data.yaml`: the folders of the splits, and the names of the classes.
 ///
-/// Ultralytics needs `train` and `val`, and folders that exist. A split without frames is left out, or replaced by another one if it is
-/// needed. The file has no `path`: Ultralytics then starts from the folder of the file, but resolves a relative `path` against its own
-/// settings or the current folder.
+/// Ultralytics needs `train` and `val`, and folders that exist. A split without frames is left out, or replaced by
+/// another one if it is needed. The file has no `path`: Ultralytics then starts from the folder of the file, but
+/// resolves a relative `path` against its own settings or the current folder.
 pub(super) fn description(classes: &[String], splits: &[Split]) -> (String, Vec<u8>) {
     let mut text = "# Complete (amodal) outlines; all fields of a slide are in the same split.\n".to_owned();
     for split in Split::ALL {

@@ -19,8 +19,8 @@ pub struct Component {
 }
 
 impl Component {
-    /// Returns the region within its bounding box: the pixels in row-major order (1 inside, 0 outside), the width, and the column
-    /// and row of the upper left pixel.
+    /// Returns the region within its bounding box: the pixels in row-major order (1 inside, 0 outside), the width, and
+    /// the column and row of the upper left pixel.
     #[must_use]
     pub fn tile(&self) -> (Vec<f32>, usize, [u32; 2]) {
         let Some(bounds) = self.mask.bounds() else { return (Vec::new(), 0, [0, 0]) };
@@ -34,8 +34,8 @@ impl Component {
     }
 }
 
-/// Returns the connected regions of equal labels, in the order of their first pixels. A binary mask is a label image with one
-/// label.
+/// Returns the connected regions of equal labels, in the order of their first pixels. A binary mask is a label image
+/// with one label.
 ///
 /// # Errors
 /// If there are more regions than the limit.

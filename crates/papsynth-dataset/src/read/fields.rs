@@ -93,8 +93,8 @@ impl FieldFile {
         &self.image
     }
 
-    /// Reads the image and the annotation. A 16-bit image does not give its saturation level: it is that of 12, 14 or 16 bits, the
-    /// smallest that is not below the brightest pixel.
+    /// Reads the image and the annotation. A 16-bit image does not give its saturation level: it is that of 12, 14 or
+    /// 16 bits, the smallest that is not below the brightest pixel.
     ///
     /// # Errors
     /// If a file cannot be read, the masks differ in size from the image, or most points are outside the image.
@@ -192,8 +192,8 @@ fn points(bytes: &[u8]) -> Result<Vec<[f64; 2]>, Problem> {
     Ok(points)
 }
 
-/// Checks that at most half of the points are outside the image. More indicate another image, or x before y; a few outside the
-/// border are common.
+/// Checks that at most half of the points are outside the image. More indicate another image, or x before y; a few
+/// outside the border are common.
 fn within(points: &[[f64; 2]], image: [usize; 2]) -> Result<(), Problem> {
     let inside = |p: &[f64; 2]| (0..2).all(|axis| (-0.5..image[axis] as f64 - 0.5).contains(&p[axis]));
     let outside = points.iter().filter(|p| !inside(p)).count();

@@ -17,11 +17,19 @@ pub struct Limits {
     pub max_file_bytes: u64,
     /// Largest number of separate regions of a label image. Default 100000.
     pub max_regions: usize,
+    /// Whether images with lossy compression (JPEG) are read. Default true; measurements of noise need false.
+    pub allow_lossy: bool,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { max_side_px: 32_768, max_pixels: 1 << 26, max_file_bytes: 1 << 30, max_regions: 100_000 }
+        Self {
+            max_side_px: 32_768,
+            max_pixels: 1 << 26,
+            max_file_bytes: 1 << 30,
+            max_regions: 100_000,
+            allow_lossy: true,
+        }
     }
 }
 

@@ -40,9 +40,13 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Problem> {
     Ok(Raster { width, channels, samples: Samples::U8(samples) })
 }
 
-/// Checks the size in every frame header of a JPEG stream, because the decoder allocates by it. Inside entropy-coded data the byte 0xFF
-/// is always followed by 0, so a match is a header, at the top or of a thumbnail.
+/// Checks whether JPEG is allowed, and the size in every frame header of a JPEG stream, because the decoder allocates
+/// by it. Inside entropy-coded data the byte 0xFF is always followed by 0, so a match is a header, at the top or of a
+/// thumbnail.
 pub(super) fn check_frames(bytes: &[u8], limits: &Limits) -> Result<(), Problem> {
+    if !limits.allow_lossy {
+        return Err(Problem::samples("lossy JPEG compression", "PNG or lossless TIFF files"));
+    }
     for header in bytes.windows(10) {
         let [0xff, 0xc0..=0xc2, 0, length, _, h1, h0, w1, w0, components] = *header else { continue };
         let [height, width] = [[h1, h0], [w1, w0]].map(u16::from_be_bytes);
@@ -104,6 +108,8 @@ mod tests {
         assert_eq!(check_frames(&[header(100, 0xc0), header(7, 0xc2)].concat(), &limits), Ok(()));
         let vast = [header(100, 0xc0), header(101, 0xc2)].concat();
         assert!(matches!(check_frames(&vast, &limits), Err(Problem::ImageSize { width: 101, .. })));
+        let lossless = Limits { allow_lossy: false, ..Limits::default() };
+        assert!(check_frames(&[], &lossless).is_err());
         // A Huffman table (0xc4) is not a frame header.
         assert_eq!(check_frames(&header(101, 0xc4), &limits), Ok(()));
     }

@@ -1,18 +1,18 @@
 //! Readers of the users' files: images, masks, label images, outlines, weight maps.
 //!
-//! Each format has a function that parses bytes and one that reads a file; errors of the second name the file. Sizes are
-//! checked against [`Limits`] before an image is decoded. Only regular files are read.
+//! Each format has a function that parses bytes and one that reads a file; errors of the second name the file. Sizes
+//! are checked against [`Limits`] before an image is decoded. Only regular files are read.
 //!
 //! # Accepted images
 //!
 //! - PNG of 1 to 16 bits.
 //! - TIFF of 8, 16 or (label images only) 32 bits: uncompressed, LZW, Deflate, PackBits or JPEG.
-//! - JPEG, grey or in colour. Label images and masks in JPEG are an error, because lossy compression changes labels. The
-//!   EXIF orientation is not applied.
+//! - JPEG, grey or in colour. Label images and masks in JPEG are an error, because lossy compression changes labels.
+//!   The EXIF orientation is not applied.
 //!
 //! Colour images are an error, because the response of a colour camera at one wavelength is unknown. Two readers accept
-//! colour: [`LevelImage`] keeps the channels, and [`FieldFile`] takes the green one. A colour file in which all pixels are
-//! grey (R = G = B, opaque) is read as grey. In label images and masks with a palette the indices are the labels.
+//! colour: [`LevelImage`] keeps the channels, and [`FieldFile`] takes the green one. A colour file in which all pixels
+//! are grey (R = G = B, opaque) is read as grey. In label images and masks with a palette the indices are the labels.
 
 mod components;
 mod fields;

@@ -80,17 +80,18 @@ pub fn read_nuclei(folder: &Path, limits: &Limits) -> Result<Vec<NucleusSample>,
     read_pairs(&folder.join("images"), &folder.join("masks"), limits)
 }
 
-/// Reads nuclei from a folder of images and one of masks. Files are matched by name without extension, and sorted by name.
+/// Reads nuclei from a folder of images and one of masks. Files are matched by name without extension, and sorted by
+/// name.
 ///
 /// # Errors
 /// If a file cannot be read, an image has no mask or a mask no image, or their sizes differ. The error names the file.
 pub fn read_pairs(images_folder: &Path, masks_folder: &Path, limits: &Limits) -> Result<Vec<NucleusSample>, Error> {
     let (images, masks) = (image_files(images_folder)?, image_files(masks_folder)?);
-    for (files, others, wanted, elsewhere) in
+    for (files, others, counterpart, elsewhere) in
         [(&images, &masks, "mask", masks_folder), (&masks, &images, "image", images_folder)]
     {
         if let Some((_, path)) = files.iter().find(|(name, _)| !others.contains_key(*name)) {
-            let problem = format!("there is no {wanted} of the same name in {}", elsewhere.display());
+            let problem = format!("there is no {counterpart} of the same name in {}", elsewhere.display());
             return Err(Error::input(path)(Problem::unfit(problem)));
         }
     }
@@ -104,8 +105,8 @@ pub fn read_pairs(images_folder: &Path, masks_folder: &Path, limits: &Limits) ->
         .collect()
 }
 
-/// Returns the PNG, JPEG and TIFF files of a folder by name without extension. Hidden files and files that are not images (by
-/// their extension) are skipped.
+/// Returns the PNG, JPEG and TIFF files of a folder by name without extension. Hidden files and files that are not
+/// images (by their extension) are skipped.
 ///
 /// # Errors
 /// If the folder has no such file, has images in other formats, or has two images that differ only in their extensions.

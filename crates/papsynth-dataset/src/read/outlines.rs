@@ -19,12 +19,12 @@ pub struct Outline {
     pub points: Vec<[f64; 2]>,
 }
 
-/// Parses a CSV table with the columns `outline` (a name), `k` (0, 1, 2, … along each outline), `x_px` and `y_px`. Columns may be in
-/// any order; the rows of an outline are consecutive.
+/// Parses a CSV table with the columns `outline` (a name), `k` (0, 1, 2, … along each outline), `x_px` and `y_px`.
+/// Columns may be in any order; the rows of an outline are consecutive.
 ///
 /// # Errors
-/// If a column is missing, a number is invalid or not finite, points are missing or out of order, or an outline has fewer
-/// than three points. The error gives the line.
+/// If a column is missing, a number is invalid or not finite, points are missing or out of order, or an outline has
+/// fewer than three points. The error gives the line.
 pub fn outlines(bytes: &[u8]) -> Result<Vec<Outline>, Problem> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
     let header = reader.headers().map_err(broken)?;

@@ -23,8 +23,8 @@ pub struct Stack {
 }
 
 impl Stack {
-    /// Reads a stack: a TIFF file of several pages, a folder of PNG, JPEG or TIFF files, or several of these files. Files of one
-    /// folder are sorted by the [numbers in their names](natural_order).
+    /// Reads a stack: a TIFF file of several pages, a folder of PNG, JPEG or TIFF files, or several of these files.
+    /// Files of one folder are sorted by the [numbers in their names](natural_order).
     ///
     /// # Errors
     /// If a file cannot be read, is not a grey image within the limits, or differs in size from the first.

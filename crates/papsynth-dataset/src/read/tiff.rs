@@ -54,8 +54,8 @@ pub(super) fn pages(
     }
 }
 
-/// Reads the pages of a file of 32-bit floating-point numbers with any number of channels. More than `most` pages are an error, because
-/// many directory entries of a short file may refer to the same data.
+/// Reads the pages of a file of 32-bit floating-point numbers with any number of channels. More than `most` pages are
+/// an error, because many directory entries of a short file may refer to the same data.
 pub(crate) fn float_pages(bytes: &[u8], limits: &Limits, most: usize) -> Result<Vec<Vec<f32>>, Problem> {
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(problem)?;
     let mut pages = Vec::new();
@@ -131,8 +131,8 @@ fn is_jpeg(decoder: &mut Reader) -> Result<bool, Problem> {
     Ok(compression == Some(CompressionMethod::ModernJPEG.to_u16()))
 }
 
-/// Checks the JPEG streams of the image at which the decoder is: their sizes, and that the file has all of their bytes. The library
-/// checks neither.
+/// Checks the JPEG streams of the image at which the decoder is: their sizes, and that the file has all of their bytes.
+/// The library checks neither.
 fn check_jpeg(decoder: &mut Reader, bytes: &[u8], limits: &Limits) -> Result<(), Problem> {
     if !is_jpeg(decoder)? {
         return Ok(());

@@ -22,8 +22,8 @@ pub struct InputFile {
     pub bytes: Vec<u8>,
 }
 
-/// Reads the file that a recipe names, if it names one, relative to `folder` (that of the recipe). The path in the recipe is then
-/// replaced by a name with the hash of the content, so that recipes with different maps differ.
+/// Reads the file that a recipe names, if it names one, relative to `folder` (that of the recipe). The path in the
+/// recipe is then replaced by a name with the hash of the content, so that recipes with different maps differ.
 ///
 /// # Errors
 /// If the file cannot be read, or all of its pixels are 0.

@@ -4,7 +4,7 @@ use papsynth::Slide;
 use papsynth::model::Model;
 use papsynth::recipe::Recipe;
 use papsynth::truth::Group;
-use papsynth_zarr::{Form, Image, Kind, Labels, Pyramid, Space, Tiling, levels_until};
+use papsynth_zarr::{Coordinates, DataType, Image, Labels, Pyramid, PyramidShape, Tiling, levels_until};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, json};
 
@@ -224,7 +224,7 @@ impl Pyramids {
     pub(super) fn new(head: &SlideHead) -> Result<Self, papsynth_zarr::Error> {
         let (width, height) = (head.width_px as usize, head.height_px as usize);
         let form = |kind, channels, planes| {
-            let form = Form {
+            let form = PyramidShape {
                 kind,
                 channels,
                 planes,
@@ -235,13 +235,13 @@ impl Pyramids {
             };
             Pyramid::new(&form)
         };
-        let kind = if head.bits <= 8 { Kind::U8 } else { Kind::U16 };
+        let kind = if head.bits <= 8 { DataType::U8 } else { DataType::U16 };
         let planes = (head.planes_um.len() > 1).then_some(head.planes_um.len());
         let channels = (head.channels > 1).then_some(head.channels);
         Ok(Self {
             image: form(kind, channels, planes)?,
-            labels: form(Kind::U32, None, None)?,
-            layers: form(Kind::U16, None, None)?,
+            labels: form(DataType::U32, None, None)?,
+            layers: form(DataType::U16, None, None)?,
         })
     }
 
@@ -257,7 +257,7 @@ impl Pyramids {
         let image = Image {
             name: format!("papsynth slide {} of seed {}", head.slide, head.identity.seed),
             pyramid: self.image.clone(),
-            space: Space {
+            coordinates: Coordinates {
                 pixel_um: head.pixel_um,
                 step_um: planes.get(1).map_or(1.0, |second| second - planes[0]),
                 first_um: planes[0],

@@ -1,6 +1,6 @@
 //! COCO documents of frames and data sets.
 
-use papsynth::scene::{Kind, Tint};
+use papsynth::scene::{ObjectKind, Tint};
 use papsynth::truth::{Group, Mask, ObjectTruth, Part, Traits, Truth};
 use serde::{Deserialize, Serialize};
 
@@ -160,7 +160,7 @@ impl Annotation {
         let unknown = |what: &str, found: &str| {
             Problem::broken("COCO", format!("annotation {}: unknown {what} `{}`", self.id, found.escape_default()))
         };
-        let kind = Kind::ALL.into_iter().find(|kind| kind.name() == self.kind);
+        let kind = ObjectKind::ALL.into_iter().find(|kind| kind.name() == self.kind);
         let tint =
             (!self.tint.is_empty()).then(|| Tint::by_name(&self.tint).ok_or_else(|| unknown("tint", &self.tint)));
         Ok(ObjectTruth {
@@ -276,8 +276,8 @@ impl Document {
     }
 }
 
-/// Reads the ground truth of every frame of a COCO document of a data set (`shards/*.coco.json`, `coco.json`), with the index of the
-/// frame, in the order of the images.
+/// Reads the ground truth of every frame of a COCO document of a data set (`shards/*.coco.json`, `coco.json`), with the
+/// index of the frame, in the order of the images.
 ///
 /// # Errors
 /// If the document is invalid, or boxes or areas differ from the masks.

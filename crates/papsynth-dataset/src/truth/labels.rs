@@ -74,8 +74,8 @@ impl Flatten {
     }
 }
 
-/// Returns the labels of a group in layers, at least one, each in row-major order. Objects of a layer do not overlap, so their masks are
-/// complete. Each object goes into the first layer with room for it, in the order of ids.
+/// Returns the labels of a group in layers, at least one, each in row-major order. Objects of a layer do not overlap,
+/// so their masks are complete. Each object goes into the first layer with room for it, in the order of ids.
 pub(crate) fn layers(truth: &Truth, group: Group) -> Vec<Vec<u32>> {
     let empty = || vec![0_u32; truth.width * truth.height];
     let mut layers = vec![empty()];

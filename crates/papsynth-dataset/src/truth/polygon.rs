@@ -1,5 +1,5 @@
-//! Masks as polygons along pixel edges: pixel (x, y) is the square from (x, y) to (x + 1, y + 1). Also masks as GeoJSON: a cell is one
-//! feature with its nucleus (`nucleusGeometry`), everything else is a detection.
+//! Masks as polygons along pixel edges: pixel (x, y) is the square from (x, y) to (x + 1, y + 1). Also masks as
+//! GeoJSON: a cell is one feature with its nucleus (`nucleusGeometry`), everything else is a detection.
 
 use papsynth::truth::{Mask, ObjectTruth, Part};
 use serde_json::{Value, json};
@@ -46,8 +46,8 @@ impl Edges {
         Some(Self { leaving, width, origin })
     }
 
-    /// Removes and returns the next edge at a corner: the sharpest turn to the right, so that pixels that touch only at a corner are
-    /// separate.
+    /// Removes and returns the next edge at a corner: the sharpest turn to the right, so that pixels that touch only at
+    /// a corner are separate.
     fn take(&mut self, corner: usize, arrived: usize) -> Option<usize> {
         let direction = [1, 0, 3].into_iter().map(|turn| (arrived + turn) % 4);
         let direction = direction.into_iter().find(|d| self.leaving[corner] >> d & 1 == 1)?;
@@ -76,9 +76,9 @@ fn toggle(leaving: &mut [u8], [start, end]: [usize; 2], direction: usize) {
     }
 }
 
-/// Returns the outlines of all parts of a mask and of their holes, sorted by their first corner from top to bottom and left to right.
-/// The first edge runs east. An outline that touches itself at a corner is split, so that each one is simple, as GeoJSON and OGC
-/// Simple Features require.
+/// Returns the outlines of all parts of a mask and of their holes, sorted by their first corner from top to bottom and
+/// left to right. The first edge runs east. An outline that touches itself at a corner is split, so that each one is
+/// simple, as GeoJSON and OGC Simple Features require.
 pub(crate) fn outlines(mask: &Mask) -> Vec<Ring> {
     let Some(mut edges) = Edges::of(mask) else { return Vec::new() };
     let mut rings = Vec::new();
@@ -145,7 +145,8 @@ fn contains(ring: &Ring, [x, y]: [u32; 2]) -> bool {
     crossed.count() % 2 == 1
 }
 
-/// Returns the features of these objects. `name` returns a unique name, `measure` the measurements of an object and of its nucleus.
+/// Returns the features of these objects. `name` returns a unique name, `measure` the measurements of an object and of
+/// its nucleus.
 pub(crate) fn collection(
     objects: &[&ObjectTruth],
     name: impl Fn(&ObjectTruth) -> String,

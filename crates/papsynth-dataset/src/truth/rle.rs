@@ -34,7 +34,8 @@ pub(crate) fn encode_in_box(mask: &Mask) -> String {
     encode(&within, bounds.width as usize, bounds.height as usize)
 }
 
-/// Returns the numbers of pixels outside, inside, outside, … in column-major order. A last count of 0 is left out, a first one is not.
+/// Returns the numbers of pixels outside, inside, outside, … in column-major order. A last count of 0 is left out, a
+/// first one is not.
 fn counts(mask: &Mask, width: usize, height: usize) -> Vec<i64> {
     // Rows `start..end` of each column, extended row by row.
     let mut columns: Vec<Vec<[u32; 2]>> = vec![Vec::new(); width];
@@ -77,8 +78,8 @@ fn counts(mask: &Mask, width: usize, height: usize) -> Vec<i64> {
     counts
 }
 
-/// Encodes a number with five bits per character, lowest first. The sixth bit is set if more follow; the fifth bit of the last
-/// character is the sign.
+/// Encodes a number with five bits per character, lowest first. The sixth bit is set if more follow; the fifth bit of
+/// the last character is the sign.
 fn push(mut value: i64, out: &mut String) {
     loop {
         #[expect(clippy::cast_sign_loss, reason = "five bits")]

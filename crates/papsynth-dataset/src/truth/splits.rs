@@ -30,8 +30,8 @@ impl Split {
         Self::draw(seed, "slide", slide)
     }
 
-    /// Draws a split with probabilities 0.8, 0.1 and 0.1. It depends only on seed and number, so frames keep their splits when a data
-    /// set grows; a split of a small data set may be empty.
+    /// Draws a split with probabilities 0.8, 0.1 and 0.1. It depends only on seed and number, so frames keep their
+    /// splits when a data set grows; a split of a small data set may be empty.
     fn draw(seed: u64, what: &str, number: u64) -> Self {
         let hash = Sha256::digest(format!("papsynth split {seed} {what} {number}"));
         let word = u32::from_le_bytes([hash[0], hash[1], hash[2], hash[3]]);

@@ -107,7 +107,8 @@ impl Cell {
         if let Self::List(cells) = self { cells } else { &[] }
     }
 
-    /// Prints the value. Numbers have the fewest digits that give the same number back; list values are separated by semicolons.
+    /// Prints the value. Numbers have the fewest digits that give the same number back; list values are separated by
+    /// semicolons.
     fn print(&self) -> String {
         match self {
             Self::Id(id) => id.to_string(),
@@ -196,11 +197,12 @@ fn csv<'a>(header: bool, columns: &[Named], rows: impl Iterator<Item = Row<'a>>)
 const OF_SLIDE: &str = "id,part,kind,class,bethesda,traits,cluster,centre_x_um,centre_y_um,depth_um,rotation_deg,mean_absorbance,\
     tint,area_um2,area_px,truncated,bbox_x_px,bbox_y_px,bbox_width_px,bbox_height_px,defocus_um";
 
-/// Returns the columns of the table of a tile of a slide. `rle` has the run lengths of the mask within its bounding box.
+/// Returns the columns of the table of a tile of a slide. `rle` has the run lengths of the mask within its bounding
+/// box.
 #[cfg(feature = "zarr")]
 pub(crate) fn slide_columns() -> Vec<Named> {
     let mask: Named = (Head::new("rle", Kind::Text), |row| Cell::text(rle::encode_in_box(&row.object.amodal)));
-    let known = OF_SLIDE.split(',').filter_map(|wanted| COLUMNS.into_iter().find(|(head, _)| head.name == wanted));
+    let known = OF_SLIDE.split(',').filter_map(|name| COLUMNS.into_iter().find(|(head, _)| head.name == name));
     known.chain([mask]).collect()
 }
 

@@ -1,4 +1,4 @@
-//! Images as bytes, the same for the same image: no time, fixed settings.
+//! Encoders of images. Equal images give equal bytes: settings are fixed, and no time is written.
 
 mod png;
 mod tiff;

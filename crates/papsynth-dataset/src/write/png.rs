@@ -4,7 +4,8 @@ use std::io;
 
 use png::{BitDepth, ColorType, Compression, Encoder, Filter, PixelDimensions, Unit};
 
-/// A grey image or one in colour, of 8 bits if `bits` are no more, else 16; `pixel_um` goes into its physical size.
+/// Encodes a grey or colour image with 8 bits, or 16 if `bits` is above 8. `pixel_um` is written as physical size
+/// (`pHYs`).
 pub(crate) fn png(levels: &[u16], width: usize, channels: usize, bits: u32, pixel_um: f64) -> io::Result<Vec<u8>> {
     let (bytes, depth): (Vec<u8>, _) = if bits <= 8 {
         #[expect(clippy::cast_possible_truncation, reason = "grey levels of 8 bits")]
@@ -18,7 +19,7 @@ pub(crate) fn png(levels: &[u16], width: usize, channels: usize, bits: u32, pixe
     encoder.set_color(if channels == 3 { ColorType::Rgb } else { ColorType::Grayscale });
     encoder.set_depth(depth);
     encoder.set_compression(Compression::Fast);
-    // One filter for all rows: as small on noisy images as a choice for each row, and twice as fast.
+    // The same filter for all rows: for noisy images as small as a choice per row, and twice as fast.
     encoder.set_filter(Filter::Up);
     let per_metre = pixels_per_metre(pixel_um);
     encoder.set_pixel_dims(Some(PixelDimensions { xppu: per_metre, yppu: per_metre, unit: Unit::Meter }));
@@ -26,14 +27,14 @@ pub(crate) fn png(levels: &[u16], width: usize, channels: usize, bits: u32, pixe
     Ok(out)
 }
 
-/// Labels, which must fit into 16 bits.
+/// Encodes labels with 16 bits.
 pub(crate) fn label_png(ids: &[u32], width: usize, pixel_um: f64) -> io::Result<Vec<u8>> {
     let levels: Vec<u16> =
         ids.iter().map(|&id| u16::try_from(id)).collect::<Result<_, _>>().map_err(io::Error::other)?;
     png(&levels, width, 1, 16, pixel_um)
 }
 
-/// An image in colour, three bytes a pixel.
+/// Encodes a colour image with three bytes per pixel.
 pub(crate) fn rgb_png(rgb: &[u8], width: usize) -> io::Result<Vec<u8>> {
     let mut out = Vec::new();
     let mut encoder = Encoder::new(&mut out, side(width)?, side(rgb.len() / (3 * width.max(1)))?);

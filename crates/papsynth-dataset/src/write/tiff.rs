@@ -1,5 +1,5 @@
-//! TIFF: pages written one after the other, compressed images, and large pages in tiles, each with the same at half the size, and again:
-//! viewers of large images read what they show.
+//! TIFF: uncompressed pages, compressed images, and pyramids of large pages in tiles, for viewers that read only the
+//! visible part.
 
 use std::borrow::Cow;
 use std::io::{self, Cursor, Seek, Write};
@@ -23,9 +23,9 @@ pub(crate) struct Page<'a> {
     pub(crate) width: usize,
     /// Channels of a pixel: 1, or 3 for red, green and blue.
     pub(crate) channels: usize,
-    /// Side of a pixel, µm.
+    /// Size of a pixel, µm.
     pub(crate) pixel_um: f64,
-    /// Its description, ASCII.
+    /// Description (`ImageDescription`), ASCII.
     pub(crate) text: Option<&'a str>,
 }
 
@@ -47,7 +47,7 @@ impl<'a> Pixels<'a> {
         }
     }
 
-    /// Bits of a value, and what they stand for.
+    /// Returns the bits and the format of a sample.
     fn sample(self) -> (u16, SampleFormat) {
         match self {
             Self::U8(_) => (8, SampleFormat::Uint),
@@ -57,7 +57,7 @@ impl<'a> Pixels<'a> {
         }
     }
 
-    /// The bytes of some values, in the order of this machine.
+    /// Returns the bytes of a range of values, in native byte order.
     fn bytes(self, range: Range<usize>) -> Cow<'a, [u8]> {
         match self {
             Self::U8(data) => data[range].data(),
@@ -68,7 +68,7 @@ impl<'a> Pixels<'a> {
     }
 }
 
-/// What the channels of a pixel are.
+/// Returns the photometric interpretation of an image.
 fn photometric(channels: usize) -> u16 {
     match channels {
         3 => PhotometricInterpretation::RGB.to_u16(),
@@ -76,7 +76,7 @@ fn photometric(channels: usize) -> u16 {
     }
 }
 
-/// The size of a pixel: pixels per centimetre, to a thousandth.
+/// Writes the resolution in pixels per centimetre, rounded to 0.001.
 fn resolution<W: Out, K: TiffKind>(directory: &mut DirectoryEncoder<W, K>, pixel_um: f64) -> TiffResult<()> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
     let n = (1e7 / pixel_um + 0.5) as u32;
@@ -85,18 +85,18 @@ fn resolution<W: Out, K: TiffKind>(directory: &mut DirectoryEncoder<W, K>, pixel
     directory.write_tag(Tag::YResolution, Rational { n, d: 1000 })
 }
 
-/// Pages of a file larger than this go into a BigTIFF. Offsets of a classic file end at 2³² bytes; the rest is for its directories.
+/// Largest size of the pages of a classic TIFF; larger ones need BigTIFF. Offsets are below 2³², and directories need
+/// some space.
 const CLASSIC_BYTES: u64 = 0xFF00_0000;
 
-/// Writes uncompressed pages to a file as they arrive. Noise and expected grey levels hardly compress, and a plane
-/// takes a tenth of the time to write this way.
+/// Writes uncompressed pages one after the other. Noisy images hardly compress, and this takes a tenth of the time.
 pub(crate) enum PageWriter<'a> {
     Classic(TiffEncoder<Box<dyn Out + 'a>, TiffKindStandard>),
     Big(TiffEncoder<Box<dyn Out + 'a>, TiffKindBig>),
 }
 
 impl<'a> PageWriter<'a> {
-    /// A file that will hold about `bytes` bytes of pixels.
+    /// Creates a file for about `bytes` bytes of pixels.
     pub(crate) fn new(out: impl Out + 'a, bytes: u64) -> io::Result<Self> {
         let out: Box<dyn Out> = Box::new(out);
         match bytes < CLASSIC_BYTES {
@@ -113,7 +113,7 @@ impl<'a> PageWriter<'a> {
         written.map_err(as_io)
     }
 
-    /// A page in tiles with smaller versions, if it is large, else as it is. For formats whose readers expect that.
+    /// Writes a large page as a pyramid in tiles, and a small page in strips.
     pub(crate) fn write_pyramid(&mut self, pixels: Pixels, page: &Page) -> io::Result<()> {
         if !is_large(page.width, pixels.len() / (page.width * page.channels).max(1)) {
             return self.write(pixels, page);
@@ -129,14 +129,14 @@ impl<'a> PageWriter<'a> {
     }
 }
 
-/// A TIFF file that gets its name when all its pages are there.
+/// A TIFF file that is renamed from its temporary name when it is complete.
 pub(crate) struct Pages {
     pending: Pending,
     writer: PageWriter<'static>,
 }
 
 impl Pages {
-    /// A file that will hold about `bytes` bytes of pixels.
+    /// Creates a file for about `bytes` bytes of pixels.
     pub(crate) fn new(pending: Pending, bytes: u64) -> Result<Self, Error> {
         let writer = PageWriter::new(pending.handle()?, bytes).map_err(Error::io("write", pending.path()))?;
         Ok(Self { pending, writer })
@@ -146,7 +146,7 @@ impl Pages {
         self.writer.write(pixels, page).map_err(Error::io("write", self.pending.path()))
     }
 
-    /// The same as a pyramid, if it is large.
+    /// Writes a large page as a pyramid.
     pub(crate) fn write_pyramid(&mut self, pixels: Pixels, page: &Page) -> Result<(), Error> {
         self.writer.write_pyramid(pixels, page).map_err(Error::io("write", self.pending.path()))
     }
@@ -156,13 +156,13 @@ impl Pages {
     }
 }
 
-/// Label images as pages, all of 16 bits, or all of 32 if a label needs them.
+/// Encodes label images as pages: all with 16 bits, or all with 32 if a label needs them.
 pub(crate) fn label_pages<I: AsRef<[u32]>>(pages: &[I], page: &Page) -> io::Result<Vec<u8>> {
     if !pages.iter().all(|ids| fits_16_bits(ids.as_ref())) {
         let pages: Vec<Pixels> = pages.iter().map(|ids| Pixels::U32(ids.as_ref())).collect();
         return compressed(&pages, page);
     }
-    #[expect(clippy::cast_possible_truncation, reason = "they fit")]
+    #[expect(clippy::cast_possible_truncation, reason = "the values fit into 16 bits")]
     let narrow: Vec<Vec<u16>> = pages.iter().map(|ids| ids.as_ref().iter().map(|&id| id as u16).collect()).collect();
     let pages: Vec<Pixels> = narrow.iter().map(|ids| Pixels::U16(ids)).collect();
     compressed(&pages, page)
@@ -172,7 +172,8 @@ pub(crate) fn fits_16_bits(ids: &[u32]) -> bool {
     ids.iter().all(|&id| id <= u16::MAX.into())
 }
 
-/// Pages of whole numbers, compressed, and not as differences along a row: ImageJ shows those as they are. The first has the text.
+/// Encodes compressed pages of integers, without the horizontal predictor, which ImageJ ignores. The first page has the
+/// description.
 pub(crate) fn compressed(pages: &[Pixels], page: &Page) -> io::Result<Vec<u8>> {
     let mut out = Cursor::new(Vec::new());
     let mut write = || -> TiffResult<()> {
@@ -187,10 +188,10 @@ pub(crate) fn compressed(pages: &[Pixels], page: &Page) -> io::Result<Vec<u8>> {
     Ok(out.into_inner())
 }
 
-/// Labels are runs, of which more effort makes little.
+/// Compression level. Label images hardly become smaller at higher levels.
 const FASTEST: u8 = 1;
 
-/// Bytes of a strip, before it is compressed.
+/// Size of an uncompressed strip of compressed pages, bytes.
 const STRIP_BYTES: usize = 1 << 18;
 
 fn compressed_page(
@@ -220,10 +221,10 @@ fn compressed_page(
     directory.finish()
 }
 
-/// Bytes of a strip that is not compressed, at least, if there are so many.
+/// Smallest size of a strip of uncompressed pages, bytes.
 const PLAIN_STRIP_BYTES: usize = 1_000_000;
 
-/// A page that is not compressed, byte by byte as the library writes it of a type known beforehand.
+/// Writes an uncompressed page, with the same bytes as the encoder of the library.
 fn plain_page<K: TiffKind>(
     encoder: &mut TiffEncoder<Box<dyn Out + '_>, K>,
     pixels: Pixels,
@@ -234,7 +235,7 @@ fn plain_page<K: TiffKind>(
     let rows = PLAIN_STRIP_BYTES.div_ceil(row * usize::from(bits / 8));
     let mut directory = encoder.image_directory()?;
     for tag in [Tag::XResolution, Tag::YResolution] {
-        // Replaced at once; what it was stays in the file.
+        // Replaced below; the library leaves the first value in the file.
         directory.write_tag(tag, Rational { n: 1, d: 1 })?;
     }
     if let Some(text) = page.text {
@@ -256,7 +257,7 @@ fn plain_page<K: TiffKind>(
     directory.finish()
 }
 
-/// What is the same of all pages in strips; each stands in the directory itself.
+/// Writes the tags that are common to all pages in strips. Their values are in the directory itself.
 fn head<K: TiffKind>(
     directory: &mut DirectoryEncoder<Box<dyn Out + '_>, K>,
     height: usize,
@@ -272,24 +273,24 @@ fn head<K: TiffKind>(
     directory.write_tag(Tag::RowsPerStrip, u32::try_from(rows)?)
 }
 
-/// Side of a tile.
+/// Width and height of a tile.
 const TILE: usize = 512;
 
-/// From this side on an image is written as a pyramid.
+/// Images of at least this width or height are written as pyramids.
 const LARGE: usize = 2048;
 
 pub(crate) fn is_large(width: usize, height: usize) -> bool {
     width.max(height) >= LARGE
 }
 
-/// Grey levels of 8 or of 16 bits.
+/// A level of 8 or 16 bits.
 trait Level: Copy + Default + Into<u32> + TryFrom<u32> {}
 
 impl Level for u8 {}
 
 impl Level for u16 {}
 
-/// An image whose channels lie side by side.
+/// An image with interleaved channels.
 struct Image<'a, T> {
     levels: &'a [T],
     width: usize,
@@ -301,7 +302,7 @@ impl<T: Level> Image<'_, T> {
         self.levels.len() / (self.width * self.channels).max(1)
     }
 
-    /// The means of two by two pixels, rounded; an odd last row or column is left out.
+    /// Returns the rounded means of 2 x 2 pixels. An odd last row or column is left out.
     fn halved(&self) -> Vec<T> {
         let (row, channels) = (self.width * self.channels, self.channels);
         let [width, height] = [self.width / 2, self.height() / 2];
@@ -313,14 +314,14 @@ impl<T: Level> Image<'_, T> {
                     let at = 2 * x * channels + channel;
                     let sum: u32 = rows.iter().map(|row| row[at].into() + row[at + channels].into()).sum();
                     let mean = T::try_from((sum + 2) / 4).ok();
-                    half.push(mean.expect("a mean of levels has no more bits than they have"));
+                    half.push(mean.expect("a mean of levels fits into their type"));
                 }
             }
         }
         half
     }
 
-    /// The levels of a tile; where it reaches beyond the image, 0.
+    /// Returns the levels of a tile; 0 outside the image.
     fn tile(&self, column: usize, row: usize) -> Vec<T> {
         let mut tile = vec![T::default(); TILE * TILE * self.channels];
         let from = column * TILE * self.channels;
@@ -333,7 +334,7 @@ impl<T: Level> Image<'_, T> {
     }
 }
 
-/// Adds a page and its smaller versions, down to one tile, as sub-images.
+/// Writes a page and, as sub-images, its smaller versions down to one tile.
 fn pyramid_page<W: Out, K: TiffKind, T: Level>(
     encoder: &mut TiffEncoder<W, K>,
     levels: &[T],
@@ -397,7 +398,7 @@ where
     resolution(directory, pixel_um)
 }
 
-/// What goes wrong with a TIFF in the making is the making's fault.
+/// Converts encoder errors to I/O errors.
 fn as_io(error: TiffError) -> io::Error {
     match error {
         TiffError::IoError(error) => error,
@@ -414,7 +415,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tiles_hold_the_image_and_every_level_its_means() {
+    fn pyramids_have_tiles_of_every_level() {
         for channels in [1, 3] {
             let (width, height) = (2111_usize, 1300_usize);
             let levels: Vec<u16> = (0..width * height * channels).map(|i| (i * 7919 % 60_013) as u16).collect();
@@ -425,7 +426,7 @@ mod tests {
             let bytes = out.into_inner();
             let mut decoder = Decoder::new(Cursor::new(&bytes)).unwrap();
             assert!(matches!(decoder.read_image().unwrap(), DecodingResult::U16(read) if read == levels));
-            assert!(!decoder.more_images(), "smaller ones lie beside the chain");
+            assert!(!decoder.more_images(), "smaller levels are not in the chain of pages");
             let mut expected = Image { levels: &levels, width, channels }.halved();
             let mut side = width / 2;
             let places = decoder.get_tag_u64_vec(Tag::SubIfd).unwrap();
@@ -449,7 +450,7 @@ mod tests {
     }
 
     #[test]
-    fn means_are_those_by_hand() {
+    fn a_small_image_is_halved_as_by_hand() {
         let image = Image { levels: &[0_u8, 1, 9, 1, 1, 9, 5, 5, 5], width: 3, channels: 1 };
         assert_eq!(image.halved(), [1]);
     }

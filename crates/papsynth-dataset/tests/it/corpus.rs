@@ -44,7 +44,7 @@ fn replay_part(target: &str, part: u64, check: fn(&[u8])) {
     let rounds: u64 = std::env::var("PAPSYNTH_FUZZ").ok().and_then(|n| n.parse().ok()).unwrap_or(0) / part;
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus").join(target);
     let Ok(entries) = fs::read_dir(&folder) else {
-        eprintln!("left out: there is no {}, the corpora are part of the repository alone", folder.display());
+        eprintln!("skipped: {} does not exist; the corpora are only in the repository", folder.display());
         return;
     };
     let mut paths: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
@@ -64,7 +64,7 @@ fn replay_part(target: &str, part: u64, check: fn(&[u8])) {
         if std::panic::catch_unwind(|| check(&bytes)).is_err() {
             let kept = std::env::temp_dir().join(format!("papsynth-fuzz-{target}-{round}"));
             fs::write(&kept, &bytes).unwrap();
-            panic!("round {round}: {} is kept", kept.display());
+            panic!("round {round}: the input is in {}", kept.display());
         }
     }
     if rounds > 0 {

@@ -367,7 +367,7 @@ fn large(width: usize, height: usize) -> Frame {
 #[test]
 #[cfg(feature = "zarr")]
 fn zarr_groups_have_every_level_and_every_complete_mask() {
-    use papsynth_zarr::{Form, Kind, Pyramid, Shard, ShardReader, Tiling, halved, halved_labels};
+    use papsynth_zarr::{DataType, Pyramid, PyramidShape, Shard, ShardReader, Tiling, halved, halved_labels};
     let scratch = Scratch::new("zarr-large");
     let (width, height) = (2101, 61);
     let frame = large(width, height);
@@ -379,7 +379,7 @@ fn zarr_groups_have_every_level_and_every_complete_mask() {
         ShardReader::open(&pyramid.levels()[level], Shard::default(), file).unwrap()
     };
     let tiling = Tiling { chunk: 512, shard: 4096, planes: 1 };
-    let form = Form { kind: Kind::U16, channels: Some(3), planes: None, height, width, tiling, levels: 4 };
+    let form = PyramidShape { kind: DataType::U16, channels: Some(3), planes: None, height, width, tiling, levels: 4 };
     let image = Pyramid::new(&form).unwrap();
     for channel in 0..3 {
         let mut expected: Vec<u16> = frame.planes[0].grey.iter().skip(channel).step_by(3).copied().collect();
@@ -392,7 +392,7 @@ fn zarr_groups_have_every_level_and_every_complete_mask() {
     }
     assert!(!group.join("4").exists());
     // Two cells overlap: there are two layers, each with one complete cell and its properties.
-    let labels = Pyramid::new(&Form { channels: None, ..form }).unwrap();
+    let labels = Pyramid::new(&PyramidShape { channels: None, ..form }).unwrap();
     for (layer, id) in [(0, 1), (1, 2)] {
         let path = group.join(format!("labels/cytoplasm-{layer}"));
         let object = |o: &&papsynth::truth::ObjectTruth| o.id == id && o.part == Part::Cytoplasm;

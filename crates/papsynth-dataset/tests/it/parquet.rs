@@ -1,4 +1,4 @@
-//! What lies in Parquet files is what lies in the others.
+//! Parquet files have the content of the other files.
 
 #![cfg(feature = "parquet")]
 
@@ -15,7 +15,7 @@ use papsynth::model::Model;
 use papsynth_dataset::read::{GreyImage, Limits as ImageLimits};
 use papsynth_dataset::{Dataset, DatasetInfo, Format, Layout, convert, rle, verify};
 
-/// Writes frames, two a shard.
+/// Writes frames in shards of the layout.
 fn write(path: &Path, layout: &Layout, frames: &[Frame]) {
     let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout };
     let dataset = Dataset::create_or_resume(path, &info).unwrap();
@@ -32,7 +32,7 @@ fn write(path: &Path, layout: &Layout, frames: &[Frame]) {
     dataset.finish().unwrap();
 }
 
-/// Columns of all rows, as a reader that is not ours reads them.
+/// Columns of all rows, read with the Parquet library.
 fn rows(path: &Path, columns: &[&str]) -> Vec<Vec<Field>> {
     let reader = SerializedFileReader::new(File::open(path).unwrap()).unwrap();
     let row = |row: parquet::record::Row| {
@@ -45,7 +45,7 @@ fn rows(path: &Path, columns: &[&str]) -> Vec<Vec<Field>> {
 fn text(value: &Field) -> &str {
     match value {
         Field::Str(text) => text,
-        other => panic!("{other:?} is no text"),
+        other => panic!("{other:?} is not a string"),
     }
 }
 
@@ -53,12 +53,12 @@ fn list(value: &Field) -> Vec<Field> {
     match value {
         Field::ListInternal(values) => values.elements().to_vec(),
         Field::Group(fields) => fields.get_column_iter().map(|(_, field)| field.clone()).collect(),
-        other => panic!("{other:?} is no list"),
+        other => panic!("{other:?} is not a list"),
     }
 }
 
 #[test]
-fn the_table_says_what_the_csv_says_and_has_the_masks() {
+fn the_table_equals_the_csv_and_has_the_masks() {
     let scratch = Scratch::new("objects");
     let frames = [frame(0, 2, 8, 1), frame(1, 1, 8, 1)];
     write(scratch.path(), &Layout::default(), &frames);
@@ -93,7 +93,7 @@ fn the_table_says_what_the_csv_says_and_has_the_masks() {
         assert_eq!(rle::decode(text(&row[1]), WIDTH, HEIGHT).unwrap(), object.visible);
         assert_eq!(row[2..], [Field::Long(WIDTH as i64), Field::Long(HEIGHT as i64)]);
     }
-    // Text alone, if that is wanted, and the other is another data set.
+    // Without Parquet, the layout differs.
     let plain = Scratch::new("objects-plain");
     let layout = Layout { objects_parquet: false, ..Layout::default() };
     write(plain.path(), &layout, &frames);
@@ -108,7 +108,7 @@ fn the_table_says_what_the_csv_says_and_has_the_masks() {
 #[test]
 fn rows_are_frames_in_files_by_split() {
     let scratch = Scratch::new("rows");
-    // Sixteen frames are of a slide.
+    // A slide has 16 frames.
     let frames: Vec<Frame> = (0..40).map(|index| frame(index, 1, 8, 1)).collect();
     let layout = Layout { frames_per_shard: 20, ..Layout::new([Format::Huggingface]) };
     write(scratch.path(), &layout, &frames);
@@ -150,13 +150,16 @@ fn rows_are_frames_in_files_by_split() {
 }
 
 #[test]
-fn stacks_keep_their_planes_and_are_converted_by_way_of_parquet() {
+fn stacks_keep_their_planes_in_conversions_through_parquet() {
     for (planes, bits) in [(1, 12), (3, 8)] {
         let name = |what: &str| Scratch::new(&format!("way-{what}-{planes}"));
         let (rows, flat, back) = (name("rows"), name("flat"), name("back"));
         let frames: Vec<Frame> = (0..3).map(|index| frame(index, planes, bits, 1)).collect();
         write(rows.path(), &Layout { frames_per_shard: 2, ..Layout::new([Format::Huggingface]) }, &frames);
-        let layout = Layout { frames_per_shard: 1, ..Layout::new([Format::OmeTiff, Format::Webdataset]) };
+        let layout = Layout {
+            frames_per_shard: 1,
+            ..Layout::new([if bits > 8 { Format::Cellpose } else { Format::OmeTiff }, Format::Webdataset])
+        };
         write(flat.path(), &layout, &frames);
         let stop = AtomicBool::new(false);
         convert(rows.path(), back.path(), &layout, &stop, &|_| ()).unwrap();
@@ -166,7 +169,7 @@ fn stacks_keep_their_planes_and_are_converted_by_way_of_parquet() {
 }
 
 #[test]
-fn images_are_read_back_only_from_files_that_are_as_recorded() {
+fn images_are_read_only_from_files_that_match_their_record() {
     let scratch = Scratch::new("as-recorded");
     write(scratch.path(), &Layout { frames_per_shard: 2, ..Layout::new([Format::Huggingface]) }, &[frame(0, 1, 8, 1)]);
     let (name, mut bytes) = contents(&scratch.join("huggingface/data")).remove(0);

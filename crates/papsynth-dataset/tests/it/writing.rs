@@ -1,4 +1,4 @@
-//! What is written is what was handed over, read back by decoders.
+//! Written frames are read back by decoders.
 
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the numbers are small")]
 
@@ -86,7 +86,7 @@ fn a_single_plane_reads_back_in_8_and_in_12_bits() {
 }
 
 #[test]
-fn the_physical_size_of_a_pixel_stands_in_every_image() {
+fn every_image_has_the_pixel_size() {
     let scratch = Scratch::new("physical");
     let dataset = open(&scratch);
     write(&dataset, &frame(0, 1, 8, 1));
@@ -137,7 +137,7 @@ fn a_stack_reads_back_plane_by_plane() {
 }
 
 #[test]
-fn colours_read_back() {
+fn colour_images_read_back() {
     for (planes, bits) in [(1, 8), (1, 12), (3, 8), (3, 16)] {
         let scratch = Scratch::new(&format!("colour-{planes}-{bits}"));
         let frame = colour_frame(0, planes, bits);
@@ -167,7 +167,7 @@ fn colours_read_back() {
 }
 
 #[test]
-fn ids_beyond_16_bits_take_32() {
+fn ids_above_16_bits_need_32() {
     for (first, wide) in [(65_532, false), (70_000, true)] {
         let scratch = Scratch::new(&format!("ids-{first}"));
         let frame = frame(0, 1, 8, first);
@@ -179,7 +179,7 @@ fn ids_beyond_16_bits_take_32() {
 }
 
 #[test]
-fn truth_is_the_same_in_masks_tables_and_labels() {
+fn ground_truth_is_the_same_in_masks_tables_and_labels() {
     let scratch = Scratch::new("truth");
     let dataset = open(&scratch);
     let frames = [frame(0, 1, 8, 1), frame(2, 3, 8, 1)];
@@ -230,7 +230,7 @@ fn truth_is_the_same_in_masks_tables_and_labels() {
 }
 
 #[test]
-fn the_manifest_names_every_file_with_its_hash() {
+fn the_manifest_lists_every_file_with_its_hash() {
     let scratch = Scratch::new("manifest");
     let dataset = open(&scratch);
     for index in [5, 0, 1] {
@@ -252,7 +252,7 @@ fn the_manifest_names_every_file_with_its_hash() {
 }
 
 #[test]
-fn bytes_depend_neither_on_order_nor_on_repetition() {
+fn bytes_do_not_depend_on_order_or_repetition() {
     let (one, two) = (Scratch::new("order-1"), Scratch::new("order-2"));
     let first = open(&one);
     for index in 0..4 {
@@ -286,7 +286,7 @@ fn pictures_show_every_object() {
     let is_grey =
         |at: usize| picture.rgb[at * 3] == picture.rgb[at * 3 + 1] && picture.rgb[at * 3] == picture.rgb[at * 3 + 2];
     for object in &frame.finished.truth.objects {
-        // The first pixel of a mask is always on its edge.
+        // The first pixel of a mask is on its border.
         let first = object.amodal.pixels(WIDTH).next().unwrap();
         assert!(!is_grey(first), "object {}", object.id);
     }
@@ -305,7 +305,7 @@ fn pictures_show_every_object() {
 }
 
 #[test]
-fn what_does_not_fit_together_is_refused_and_leaves_no_frame() {
+fn inconsistent_input_is_refused_and_writes_no_frame() {
     let scratch = Scratch::new("misfit");
     let dataset = open(&scratch);
     let good = frame(0, 2, 8, 1);
@@ -332,8 +332,8 @@ fn what_does_not_fit_together_is_refused_and_leaves_no_frame() {
     plane.grey.pop();
     refused(begin().write_plane(&plane).unwrap_err(), "3499 grey levels");
     let mut finished = good.finished.clone();
-    finished.truth.objects[0].class = "unheard of".to_owned();
-    refused(both().end(&finished).unwrap_err(), "unheard of cytoplasm");
+    finished.truth.objects[0].class = "unknown class".to_owned();
+    refused(both().end(&finished).unwrap_err(), "unknown class cytoplasm");
     let mut finished = good.finished.clone();
     finished.truth.width += 1;
     refused(both().end(&finished).unwrap_err(), "the truth is that of 71 x 50 pixels");

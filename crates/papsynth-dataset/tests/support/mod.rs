@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use papsynth::key::Key;
 use papsynth::recipe::{Binning, Mixing, PhotonNoise, Recipe, Rendition, Restore, Subsampling};
 use papsynth::scene::{
-    Kind, Restoration, Scene, SceneBackground, SceneCamera, SceneDyes, SceneIllumination, SceneLight, SceneOptics,
-    Tint, View,
+    ObjectKind, Restoration, Scene, SceneBackground, SceneCamera, SceneDyes, SceneIllumination, SceneLight,
+    SceneOptics, Tint, View,
 };
 use papsynth::truth::{Group, Mask, ObjectTruth, Part, Run, Trait, Truth, visible_masks};
 use papsynth::{Finished, Frame, Plane};
@@ -132,13 +132,21 @@ fn disc(x: f32, y: f32, radius: f32) -> Mask {
     Mask::from_tile(&tile, WIDTH, [0, 0], WIDTH, HEIGHT, |v| v > 0.5)
 }
 
-fn object(id: u32, part: Part, kind: Kind, class: &str, depth_um: f64, planes: &[f64], amodal: Mask) -> ObjectTruth {
+fn object(
+    id: u32,
+    part: Part,
+    kind: ObjectKind,
+    class: &str,
+    depth_um: f64,
+    planes: &[f64],
+    amodal: Mask,
+) -> ObjectTruth {
     ObjectTruth {
         id,
         part,
         kind,
         class: class.to_owned(),
-        bethesda: if kind == Kind::Cell { "NILM".to_owned() } else { String::new() },
+        bethesda: if kind == ObjectKind::Cell { "NILM".to_owned() } else { String::new() },
         traits: [Trait::Flap, Trait::Pyknotic].into_iter().collect(),
         cluster: 1,
         centre_um: [3.25, 7.5],
@@ -173,12 +181,12 @@ fn frame_of(scene: Scene, first_id: u32) -> Frame {
     let shift = (index % 7) as f32;
     let near = first_id + 1;
     let mut objects = vec![
-        object(first_id, Part::Cytoplasm, Kind::Cell, &class, -0.5, z, disc(18.0 + shift, 22.0, 17.0)),
-        object(first_id, Part::Nucleus, Kind::Cell, &class, -0.5, z, disc(18.0 + shift, 22.0, 5.0)),
-        object(near, Part::Cytoplasm, Kind::Cell, &class, 0.5, z, disc(40.0, 24.0, 16.0)),
-        object(near, Part::Nucleus, Kind::Cell, &class, 0.5, z, disc(42.0, 24.0, 4.0)),
-        object(near + 1, Part::Whole, Kind::Leukocyte, "leukocyte", 0.0, z, disc(0.0, 45.0, 6.0)),
-        object(near + 2, Part::Whole, Kind::Speckle, "speckle", 1.0, z, disc(60.0, 6.0, 0.5)),
+        object(first_id, Part::Cytoplasm, ObjectKind::Cell, &class, -0.5, z, disc(18.0 + shift, 22.0, 17.0)),
+        object(first_id, Part::Nucleus, ObjectKind::Cell, &class, -0.5, z, disc(18.0 + shift, 22.0, 5.0)),
+        object(near, Part::Cytoplasm, ObjectKind::Cell, &class, 0.5, z, disc(40.0, 24.0, 16.0)),
+        object(near, Part::Nucleus, ObjectKind::Cell, &class, 0.5, z, disc(42.0, 24.0, 4.0)),
+        object(near + 1, Part::Whole, ObjectKind::Leukocyte, "leukocyte", 0.0, z, disc(0.0, 45.0, 6.0)),
+        object(near + 2, Part::Whole, ObjectKind::Speckle, "speckle", 1.0, z, disc(60.0, 6.0, 0.5)),
     ];
     let of_part = |objects: &[ObjectTruth], part: Part| -> Vec<usize> {
         (0..objects.len()).filter(|&i| objects[i].part == part).collect()

@@ -1,4 +1,4 @@
-//! Free cells and their cytoplasm.
+//! Features of free cells and their cytoplasm.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::RangeInclusive;
@@ -9,57 +9,57 @@ use crate::region::{Region, Shape, components, distance, smoothed};
 use crate::statistics::{deviation, mean, of_sorted, sorted};
 use crate::table::{FeatureKind, Row};
 
-/// Darker than this is a cell, absorbance after a Gaussian of 1 pixel.
+/// Minimum absorbance of cells, after a Gaussian of 1 pixel.
 pub(crate) const COVERED: f32 = 0.03;
 
-/// Areas of cells, µm².
+/// Range of the areas of cells, µm².
 const AREAS_UM2: RangeInclusive<f64> = 150.0..=8000.0;
 
-/// Less solid things are clumps.
+/// Minimum solidity of a cell; less solid objects are clumps.
 const SOLID: f64 = 0.75;
 
-/// Bins from the rim to the centre.
+/// Rings from the border to the centre of a free cell.
 pub const PROFILE: usize = 10;
 
-/// So much around a nucleus is not counted as cytoplasm, pixels.
+/// Margin around the nucleus that is not counted as cytoplasm, pixels.
 const NUCLEUS_MARGIN: f32 = 3.0;
 
-/// Chords whose angle tells corners from straight runs, µm.
+/// Length of the chords whose angle defines corners and straight parts, µm.
 const CHORD_UM: f64 = 3.0;
 
-/// An outline that turns by more between two chords has a corner there, degrees.
+/// Minimum angle between two chords at a corner, degrees.
 const CORNER_DEG: f64 = 45.0;
 
-/// By less, it is straight.
+/// Maximum angle between two chords of a straight part, degrees.
 const STRAIGHT_DEG: f64 = 6.0;
 
-/// Sectors that are compared around the centre.
+/// Sectors around the centre.
 const SECTORS: usize = 8;
 
-/// A cell that lies free and whole, with one nucleus.
+/// A free and complete cell with one nucleus.
 pub(crate) struct Cell<'a> {
     region: Region,
     pub(crate) shape: Shape,
     nucleus: &'a Region,
     pub(crate) outline: Outline,
-    /// Pixels of cytoplasm, with their distance to the rim over the largest there is.
+    /// Pixels of cytoplasm with their distances to the border, relative to the largest distance.
     cytoplasm: Vec<(usize, f64)>,
-    /// Their absorbances in order.
+    /// Sorted absorbances of the cytoplasm.
     sorted: Vec<f64>,
 }
 
-/// How a line turns.
+/// Corners and straight parts of an outline.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Outline {
-    /// Corners outwards.
+    /// Number of convex corners.
     pub(crate) corners: f64,
-    /// Corners inwards.
+    /// Number of concave corners.
     pub(crate) notches: f64,
-    /// Part of it that is straight.
+    /// Straight fraction of the outline.
     pub(crate) straight: f64,
 }
 
-/// The free cells of a picture; `nuclei` are all its nuclei, and `ids` has their numbers from 1 on in their pixels.
+/// Returns the free cells of an image; `ids` holds the number of the nucleus of each pixel, from 1.
 pub(crate) fn cells<'a>(maps: &Maps, ids: &[u32], nuclei: &'a [Region], pixel_um: f64) -> Vec<Cell<'a>> {
     let covered: Vec<bool> = maps.smooth.iter().map(|a| *a > COVERED).collect();
     let um2 = pixel_um * pixel_um;
@@ -93,12 +93,13 @@ impl<'a> Cell<'a> {
         Self { shape: region.shape(), region, nucleus, outline, cytoplasm, sorted }
     }
 
-    /// Median absorbance of the cytoplasm.
+    /// Returns the median absorbance of the cytoplasm.
     pub(crate) fn middle(&self) -> f64 {
         of_sorted(&self.sorted, 0.5)
     }
 
-    /// Absorbance in bins from the rim to the centre, over the cell's median; NaN where the nucleus fills a bin.
+    /// Returns the absorbance in rings from border to centre over the median of the cell; NaN if the nucleus fills a
+    /// ring.
     pub(crate) fn profile(&self, maps: &Maps) -> [f64; PROFILE] {
         let (mut sums, mut counts) = ([0.0; PROFILE], [0.0; PROFILE]);
         for (p, depth) in &self.cytoplasm {
@@ -110,7 +111,7 @@ impl<'a> Cell<'a> {
         std::array::from_fn(|i| if counts[i] > 0.0 { sums[i] / counts[i] / middle } else { f64::NAN })
     }
 
-    /// All its features.
+    /// Returns the features of the cell.
     pub(crate) fn features(&self, maps: &Maps, pixel_um: f64) -> Row {
         let mut row = Row::default();
         let um2 = pixel_um * pixel_um;
@@ -158,7 +159,7 @@ impl<'a> Cell<'a> {
         row.put(FeatureKind::Texture, "unevenness between sectors", deviation(&sectors));
         row.put(FeatureKind::Texture, "darkest sector over median", sectors.iter().copied().fold(f64::NAN, f64::max));
 
-        let near = self.rim();
+        let near = self.border();
         let rim = sorted(maps.edges.iter().filter(|e| near.binary_search(&e.pixel).is_ok()).map(|e| e.sigma));
         for q in [0.25, 0.5] {
             let name = format!("sigma of the cell's rim, px, quantile {q}");
@@ -173,8 +174,8 @@ impl<'a> Cell<'a> {
         whole((libm::atan2(y, x) / TAU + 0.5) * SECTORS as f64).min(SECTORS - 1)
     }
 
-    /// Pixels at most three from the cell's rim, in order.
-    fn rim(&self) -> Vec<usize> {
+    /// Returns the sorted pixels at most 3 pixels from the border of the cell.
+    fn border(&self) -> Vec<usize> {
         const NEAR: f32 = 3.0;
         let tile = self.region.tile(whole(f64::from(NEAR)) + 1);
         let (inner, outer) = (tile.depths(), tile.heights());
@@ -184,7 +185,7 @@ impl<'a> Cell<'a> {
 }
 
 impl Outline {
-    /// Of a closed line along the corners of pixels; `chord` in pixels.
+    /// Measures a closed line along pixel corners; `chord` in pixels.
     pub(crate) fn new(line: &[[f64; 2]], chord: f64) -> Self {
         let line = smoothed(line, nearest(chord / 2.0).max(3));
         let n = line.len();
@@ -195,7 +196,7 @@ impl Outline {
         let turn = |i: usize| {
             let (a, b, c) = (line[(i + n - step) % n], line[i], line[(i + step) % n]);
             let (u, v) = ([b[0] - a[0], b[1] - a[1]], [c[0] - b[0], c[1] - b[1]]);
-            // The line runs anticlockwise on the screen, where y points down: outwards turns are negative.
+            // The line runs anticlockwise on the screen and y points downwards, so convex turns are negative.
             -libm::atan2(u[0] * v[1] - u[1] * v[0], u[0] * v[0] + u[1] * v[1]).to_degrees()
         };
         let turns: Vec<f64> = (0..n).map(turn).collect();
@@ -223,7 +224,7 @@ mod tests {
 
     const PIXEL_UM: f64 = 0.33;
 
-    /// A field of one absorbance image.
+    /// Returns the maps of an image of this absorbance.
     fn maps(a: impl Fn(f64, f64) -> f64) -> Maps {
         Maps::drawn(260, 220, |x, y| 240.0 * libm::pow(10.0, -a(x, y)))
     }
@@ -236,8 +237,8 @@ mod tests {
     }
 
     #[test]
-    fn a_free_cell_has_its_profile_size_and_place() {
-        // Thin at the rim, and twice as dark in the middle.
+    fn profile_size_and_nucleus_of_a_free_cell_are_measured() {
+        // Thin at the border, and twice as dark in the centre.
         let depth = |x: f64, y: f64| 1.0 - distance([x, y], [120.0, 110.0]) / 70.0;
         let maps = maps(|x, y| {
             if depth(x, y) > 0.0 {
@@ -254,7 +255,7 @@ mod tests {
         let profile = cell.profile(&maps);
         for (i, value) in profile.iter().enumerate().take(8) {
             let wanted = (0.1 + 0.1 * (i as f64 + 0.5) / 10.0) / cell.middle();
-            // The camera has whole levels of grey, and the outermost bin some of the slide.
+            // Grey levels are rounded, and the outermost ring includes empty slide.
             assert!((value - wanted).abs() < if i == 0 { 0.12 } else { 0.04 }, "{i}: {value}, not {wanted}");
         }
         let table: crate::table::FeatureTable =
@@ -266,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_with_two_nuclei_none_or_at_the_border_are_left_out() {
+    fn cells_with_two_nuclei_without_nucleus_or_at_the_border_are_ignored() {
         let body = |x: f64, y: f64| {
             if distance([x, y], [120.0, 110.0]) < 60.0 || distance([x, y], [0.0, 0.0]) < 50.0 { 0.2 } else { 0.0 }
         };
@@ -280,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn corners_notches_and_straight_runs_are_counted() {
+    fn corners_notches_and_straight_parts_are_counted() {
         let outline = |inside: &dyn Fn(f64, f64) -> bool| {
             let all: Vec<bool> = (0..200 * 200).map(|i| inside(f64::from(i % 200), f64::from(i / 200))).collect();
             Outline::new(&components(&all, 200)[0].outline(), CHORD_UM / PIXEL_UM)

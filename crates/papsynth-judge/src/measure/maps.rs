@@ -1,47 +1,47 @@
-//! What is computed once for a picture.
+//! Maps of an image that several measurements use.
 
 use crate::background::Background;
 use crate::filter::{blur, gradient, halved, slope};
 use crate::image::FieldImage;
 use crate::statistics::of_sorted;
 
-/// A picture and what several measurements need of it.
+/// Maps of an image.
 pub(crate) struct Maps {
     pub(crate) width: usize,
     pub(crate) height: usize,
     pub(crate) background: Background,
-    /// Grey levels of 8 bits, 0 to 255.
+    /// Grey levels, 0 to 255.
     pub(crate) grey: Vec<f32>,
     pub(crate) absorbance: Vec<f32>,
     /// Absorbance after a Gaussian of 1 pixel.
     pub(crate) smooth: Vec<f32>,
-    /// After one of 2 pixels.
+    /// Absorbance after a Gaussian of 2 pixels.
     pub(crate) smoother: Vec<f32>,
-    /// Length of the gradient of `smooth`.
+    /// Magnitude of the gradient of `smooth`.
     pub(crate) slope: Vec<f32>,
     pub(crate) edges: Vec<Edge>,
-    /// Absorbance between one scale and the next, each scale in half as many pixels a side as the one before.
+    /// Band-pass images of absorbance with their widths; each has half the resolution of the previous one.
     pub(crate) bands: Vec<(Vec<f32>, usize)>,
 }
 
-/// Scales of the bands: 1, 2, 4, … pixels.
+/// Number of bands, at scales of 1, 2, 4, … pixels.
 pub(crate) const BANDS: usize = 6;
 
 impl Maps {
-    pub(crate) fn new(picture: &FieldImage) -> Self {
-        let width = picture.width;
-        let background = Background::new(&picture.grey, width, picture.full_scale);
-        let absorbance = background.absorbance(&picture.grey, picture.full_scale);
+    pub(crate) fn new(image: &FieldImage) -> Self {
+        let width = image.width;
+        let background = Background::new(&image.grey, width, image.full_scale);
+        let absorbance = background.absorbance(&image.grey, image.full_scale);
         let smooth = blur(&absorbance, width, 1.0);
         // Variances add: 1² + √3² = 2².
         let smoother = blur(&smooth, width, 3.0_f64.sqrt());
-        let to_8_bits = 255.0 / picture.full_scale;
+        let to_8_bits = 255.0 / image.full_scale;
         let (slope, wide_slope) = (slope(&smooth, width), slope(&smoother, width));
         Self {
             width,
-            height: picture.height(),
+            height: image.height(),
             background,
-            grey: picture.grey.iter().map(|g| g * to_8_bits).collect(),
+            grey: image.grey.iter().map(|g| g * to_8_bits).collect(),
             edges: edges(&smooth, width, &slope, &wide_slope),
             slope,
             bands: bands(&absorbance, width),
@@ -51,7 +51,7 @@ impl Maps {
         }
     }
 
-    /// Root mean square of a band over pixels.
+    /// Returns the root mean square of a band over pixels.
     pub(crate) fn power(&self, pixels: impl Iterator<Item = usize>, band: usize) -> f64 {
         let (values, wide) = &self.bands[band];
         let (mut sum, mut count) = (0.0, 0_usize);
@@ -63,7 +63,7 @@ impl Maps {
         (sum / count.max(1) as f64).sqrt()
     }
 
-    /// How many of the pixels are darker and how many paler than all eight around them, as parts of them.
+    /// Returns the fractions of pixels that are darker and that are paler than all eight neighbours.
     pub(crate) fn extrema(&self, pixels: impl Iterator<Item = usize>) -> [f64; 2] {
         let (mut dark, mut pale, mut count) = (0.0, 0.0, 0.0);
         let width = self.width;
@@ -94,27 +94,27 @@ fn bands(absorbance: &[f32], width: usize) -> Vec<(Vec<f32>, usize)> {
     bands
 }
 
-/// Edges are at least so steep, absorbance a pixel after a Gaussian of 1 pixel.
+/// Minimum gradient of edges, absorbance per pixel after a Gaussian of 1 pixel.
 const STEEP: f32 = 0.02;
 
-/// Fewer places on edges tell nothing of their width.
+/// Minimum number of edge pixels for a width.
 const LEAST: usize = 20;
 
-/// A quantile of blurs in order; NaN of too few.
+/// Returns a quantile of sorted blurs; NaN for too few.
 pub(crate) fn width_at(sigmas: &[f64], q: f64) -> f64 {
     if sigmas.len() < LEAST { f64::NAN } else { of_sorted(sigmas, q) }
 }
 
-/// A place on an edge.
+/// An edge pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Edge {
     pub(crate) pixel: usize,
-    /// Standard deviation of the Gaussian that blurred it, pixels.
+    /// Blur of the edge: standard deviation of a Gaussian, pixels.
     pub(crate) sigma: f64,
 }
 
-/// Every place where the slope is steep, and steeper than on both sides of it: of an image after a Gaussian of 1 pixel, with the
-/// lengths of its gradient and of that after a Gaussian of 2 pixels.
+/// Returns the pixels where the gradient is large and has a maximum across the edge. `slope` and `wide_slope` are the
+/// magnitudes of the gradient after Gaussians of 1 and 2 pixels.
 pub(crate) fn edges(smooth: &[f32], width: usize, slope: &[f32], wide_slope: &[f32]) -> Vec<Edge> {
     let [across, down] = gradient(smooth, width);
     let mut edges = Vec::new();
@@ -145,11 +145,11 @@ pub(crate) fn edges(smooth: &[f32], width: usize, slope: &[f32], wide_slope: &[f
     edges
 }
 
-/// Differences between neighbours on both sides blur an edge too, by this variance.
+/// Variance of the blur by central differences.
 const DIFFERENCE: f64 = 1.0 / 3.0;
 
-/// The blur s of an edge from its slopes after Gaussians of 1 and 2 pixels, which are as 1/√(s² + 1 + ⅓) to 1/√(s² + 4 + ⅓). None
-/// where the slope falls faster or slower than that of any edge: there is something thin, or a gentle ramp.
+/// Returns the blur s of an edge from its gradients after Gaussians of 1 and 2 pixels, which are proportional to
+/// 1/√(s² + 1 + ⅓) and 1/√(s² + 4 + ⅓). None if no edge has this ratio: the object is a thin line or a ramp.
 fn sigma(slope: f64, wide_slope: f64) -> Option<f64> {
     let ratio = slope / wide_slope.max(1e-9);
     let square = ratio * ratio;
@@ -161,7 +161,7 @@ mod tests {
     use super::*;
 
     impl Maps {
-        /// Of a light at each column and row.
+        /// Returns the maps of an image with this light at each column and row.
         pub(crate) fn drawn(width: usize, height: usize, light: impl Fn(f64, f64) -> f64) -> Self {
             let at = |i: usize| crate::number::single(light((i % width) as f64, (i / width) as f64));
             Self::new(&FieldImage { grey: (0..width * height).map(at).collect(), width, ..FieldImage::default() })
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn the_blur_of_an_edge_is_found_whatever_its_direction() {
+    fn the_blur_of_an_edge_is_measured_in_all_directions() {
         for (sigma, turn) in [(0.8, 0.0), (1.0, 0.3), (1.5, 0.8), (2.0, 1.2), (3.0, 2.5)] {
             let (sin, cos) = (libm::sin(turn), libm::cos(turn));
             let maps = Maps::drawn(120, 100, |x, y| {

@@ -203,8 +203,8 @@ impl Measurer {
         })
     }
 
-    /// Measures several images in parallel. `read` returns the image of an item, so that not all images are in memory at once. The
-    /// phase of the progress reports is "measuring fields".
+    /// Measures several images in parallel. `read` returns the image of an item, so that not all images are in memory
+    /// at once. The phase of the progress reports is "measuring fields".
     ///
     /// # Errors
     /// The first error of `read` or of [`measure_with`](Self::measure_with), in the order of the items.

@@ -1,31 +1,31 @@
-//! Noise, and how much neighbours share of it.
+//! Noise and its correlation between pixels.
 
 use crate::background::Surface;
 
-/// Side of the blocks that noise is measured in, pixels.
+/// Size of the blocks in which noise is measured, pixels.
 pub(crate) const BLOCK: usize = 32;
 
-/// Noise of a block without its quadratic surface, or of several at the mean.
+/// Noise of a block after subtraction of a quadratic surface, or the mean over blocks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Noise {
-    /// Squared levels of 8 bits.
+    /// Variance, squared grey levels of 255.
     pub(crate) variance: f64,
     /// Covariances at [`LAGS`](Self::LAGS).
     pub(crate) products: [f64; 5],
 }
 
-/// Upper left corners of the blocks in a part of a picture.
+/// Returns the upper left corners of the blocks in a part of an image.
 pub(crate) fn blocks([left, top]: [usize; 2], [wide, high]: [usize; 2]) -> impl Iterator<Item = [usize; 2]> {
     let along = |from: usize, length: usize| (from..(from + length).saturating_sub(BLOCK - 1)).step_by(BLOCK);
     along(top, high).flat_map(move |y| along(left, wide).map(move |x| [x, y]))
 }
 
 impl Noise {
-    /// What is compared with what: names, steps across and down.
+    /// Lags: name, horizontal and vertical step.
     pub(crate) const LAGS: [(&'static str, [usize; 2]); 5] =
         [("1 across", [1, 0]), ("1 down", [0, 1]), ("1 diagonally", [1, 1]), ("2 across", [2, 0]), ("2 down", [0, 2])];
 
-    /// Terms of the surface that is taken off.
+    /// Terms of the subtracted surface.
     const TERMS: f64 = 6.0;
 
     pub(crate) fn of(grey: &[f32], width: usize, [left, top]: [usize; 2]) -> Self {
@@ -47,7 +47,7 @@ impl Noise {
         }
     }
 
-    /// The mean of several blocks, the noisiest fifth left out: something lay in them. None of none.
+    /// Returns the mean over blocks without the noisiest fifth, which may contain objects. None for no blocks.
     pub(crate) fn mean(blocks: &mut Vec<Self>) -> Option<Self> {
         blocks.sort_by(|a, b| a.variance.total_cmp(&b.variance));
         blocks.truncate((blocks.len() * 4).div_ceil(5));
@@ -59,7 +59,7 @@ impl Noise {
         })
     }
 
-    /// Correlation at a lag. The surface that was taken off makes it too small by up to 6/32² = 0.006.
+    /// Returns the correlation at a lag. The subtracted surface reduces it by up to 6/32² = 0.006.
     pub(crate) fn correlation(&self, lag: usize) -> f64 {
         self.products[lag] / self.variance.max(1e-6)
     }
@@ -74,7 +74,7 @@ mod tests {
     use portable_numerics::random::below;
 
     #[test]
-    fn variance_and_correlation_of_noise_are_found() {
+    fn variance_and_correlation_of_noise_are_measured() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
         let (width, height) = (256, 256);
         // Uniform over ±3: variance 3.
@@ -88,10 +88,10 @@ mod tests {
             Noise::mean(&mut blocks).unwrap()
         };
         let plain = measured(&|x, y| white[y * width + x]);
-        // The noisiest fifth is left out: of blocks of 1024 pixels that takes 1 % off.
+        // Exclusion of the noisiest fifth reduces the variance of blocks of 1024 pixels by 1 %.
         assert!((plain.variance - 3.0).abs() < 0.1, "{plain:?}");
         assert!((0..5).all(|lag| plain.correlation(lag).abs() < 0.015), "{plain:?}");
-        // Half of the pixel below: correlation 0.5/1.25 = 0.4 down, nothing across.
+        // Plus half of the pixel below: vertical correlation 0.5/1.25 = 0.4, no horizontal one.
         let smeared = measured(&|x, y| white[y * width + x] + 0.5 * white[((y + 1) % height) * width + x]);
         assert!((smeared.variance - 3.75).abs() < 0.15, "{smeared:?}");
         let wanted = [0.0, 0.4, 0.0, 0.0, 0.0];

@@ -1,4 +1,4 @@
-//! What a nucleus looks like.
+//! Features of a nucleus.
 
 use std::f64::consts::{PI, TAU};
 
@@ -12,26 +12,26 @@ use crate::region::Region;
 use crate::statistics::{deviation, mean, median, of_sorted, sorted};
 use crate::table::{FeatureKind, Row};
 
-/// The rim, which is blurred, is left out of the core: pixels.
+/// Width of the blurred border that is not part of the core, pixels.
 pub(crate) const RIM_PX: f64 = 2.0;
 
-/// Bins from the rim to the centre.
+/// Rings from the border to the centre.
 const BINS: usize = 5;
 
-/// Sectors that are compared around the rim.
+/// Sectors around the centre.
 const SECTORS: usize = 12;
 
-/// Distances at which grey levels are compared, pixels.
+/// Distances of correlations, pixels.
 const LAGS: [usize; 5] = [1, 2, 3, 4, 6];
 
-/// The surroundings begin and end so far from the rim, µm.
+/// Inner and outer distance of the surroundings from the border, µm.
 const BESIDE_UM: [f64; 2] = [0.8, 2.5];
 
-/// And further out.
+/// Inner and outer distance of the outer surroundings, µm.
 const BEYOND_UM: [f64; 2] = [2.5, 5.0];
 
-/// Radial profiles reach so far to either side of the rim, pixels.
-const REACH_PX: i32 = 4;
+/// Length of radial profiles on each side of the border, pixels.
+const PROFILE_PX: i32 = 4;
 
 /// A pixel in or around a nucleus.
 struct Pixel {
@@ -39,12 +39,12 @@ struct Pixel {
     x: f64,
     y: f64,
     a: f64,
-    /// Distance from the rim, pixels; positive inside.
+    /// Distance from the border, pixels; positive inside.
     depth: f64,
     sector: usize,
 }
 
-/// All features of a nucleus; `ids` is above 0 in every pixel of any nucleus.
+/// Returns the features of a nucleus; `ids` is above 0 in all nuclei.
 pub(crate) fn features(maps: &Maps, region: &Region, ids: &[u32], pixel_um: f64) -> Row {
     let shape = region.shape();
     let pixels = pixels(maps, region, ids, shape.centre, whole(BEYOND_UM[1] / pixel_um) + 2);
@@ -84,7 +84,7 @@ pub(crate) fn features(maps: &Maps, region: &Region, ids: &[u32], pixel_um: f64)
     row.put(FeatureKind::Texture, "core dark tail", (of_sorted(&core_a, 0.95) - middle) / sd.max(1e-3));
     row.put(FeatureKind::Texture, "core pale tail", (middle - of_sorted(&core_a, 0.05)) / sd.max(1e-3));
 
-    // From the rim to the centre, against the surroundings and the core.
+    // From border to centre: 0 in the surroundings, 1 in the core.
     for bin in 0..BINS {
         let of = |d: f64| nearest(BINS as f64 * d / deepest - 0.5).min(BINS - 1);
         let a = mean_of(pixels.iter().filter(|p| p.depth > 0.0 && of(p.depth) == bin).map(|p| p.a));
@@ -95,9 +95,9 @@ pub(crate) fn features(maps: &Maps, region: &Region, ids: &[u32], pixel_um: f64)
         );
     }
     let at_depth = |d: f64| mean_of(pixels.iter().filter(|p| (p.depth - d).abs() < 0.75).map(|p| p.a));
-    let profile: Vec<f64> = (-REACH_PX..REACH_PX).map(|d| at_depth(f64::from(d) + 0.5)).collect();
+    let profile: Vec<f64> = (-PROFILE_PX..PROFILE_PX).map(|d| at_depth(f64::from(d) + 0.5)).collect();
     let steepest = profile.windows(2).map(|w| w[1] - w[0]).filter(|s| s.is_finite()).fold(1e-3, f64::max);
-    // The step of an edge blurred by σ has the slope 1/(σ √(2π)) of its height.
+    // The maximum gradient of a step of height 1 that is blurred by σ is 1/(σ √(2π)).
     row.put(FeatureKind::Border, "rim sigma, px", contrast / (steepest * TAU.sqrt()));
     let inwards = profile.iter().skip(profile.len() / 2).filter(|v| v.is_finite());
     let membrane = inwards.copied().fold(f64::NEG_INFINITY, f64::max);
@@ -111,15 +111,15 @@ pub(crate) fn features(maps: &Maps, region: &Region, ids: &[u32], pixel_um: f64)
 
     let rests = detrended(&core);
     let at = |index: usize| core.binary_search_by_key(&index, |p| p.index).ok().map(|i| rests[i]);
-    // With what lies so many pixels to the right and below.
-    let alike = |across: usize, down: usize| {
+    // Correlation with the pixels so many columns to the right and rows below.
+    let correlated = |across: usize, down: usize| {
         let inside = core.iter().zip(&rests).filter(|(p, _)| p.index % maps.width + across < maps.width);
         let pairs = inside.filter_map(|(p, rest)| Some((*rest, at(p.index + down * maps.width + across)?)));
         let (a, b): (Vec<f64>, Vec<f64>) = pairs.filter(|(a, b)| a.is_finite() && b.is_finite()).unzip();
         if a.len() < 8 { f64::NAN } else { correlation(&a, &b) }
     };
     for lag in LAGS {
-        let both = [alike(lag, 0), alike(0, lag)];
+        let both = [correlated(lag, 0), correlated(0, lag)];
         row.put(FeatureKind::Texture, format!("core correlation at {lag} px"), mean(&both));
         if lag <= 2 {
             row.put(FeatureKind::Noise, format!("core correlation down less across at {lag} px"), both[1] - both[0]);
@@ -154,7 +154,7 @@ fn pixels(maps: &Maps, region: &Region, ids: &[u32], centre: [f64; 2], margin: u
         if ids[index] > 0 && !tile.inside[i] {
             return None;
         }
-        // The rim lies half a pixel outside the outermost pixel's centre.
+        // The border is half a pixel outside the centre of the outermost pixel.
         let depth = if tile.inside[i] { f64::from(depths[i]) - 0.5 } else { 0.5 - f64::from(heights[i]) };
         let (x, y) = ((index % maps.width) as f64, (index / maps.width) as f64);
         let turn = libm::atan2(y - centre[1], x - centre[0]) / TAU + 0.5;
@@ -173,7 +173,7 @@ fn standard_moment(values: &[f64], mean: f64, sd: f64, n: i32) -> f64 {
     mean_of(values.iter().map(|v| libm::pow((v - mean) / sd, f64::from(n))))
 }
 
-/// How far the outline's radii differ from those of the ellipse of the same moments, as a part of the radius.
+/// Returns the standard deviation of the radii of the outline over those of the ellipse of the same moments.
 fn roughness(region: &Region, shape: &crate::region::Shape) -> f64 {
     let outline = crate::region::smoothed(&region.outline(), 5);
     let long = (shape.area / PI / (1.0 - shape.eccentricity * shape.eccentricity).max(0.01).sqrt()).sqrt();
@@ -187,7 +187,7 @@ fn roughness(region: &Region, shape: &crate::region::Shape) -> f64 {
     deviation(&outline.iter().map(ratio).collect::<Vec<_>>())
 }
 
-/// What is left of the core's absorbance without a quadratic surface.
+/// Returns the absorbance of the core minus a fitted quadratic surface.
 fn detrended(core: &[&Pixel]) -> Vec<f64> {
     let (mx, my) = (mean_of(core.iter().map(|p| p.x)), mean_of(core.iter().map(|p| p.y)));
     let size = core.iter().map(|p| (p.x - mx).abs().max((p.y - my).abs())).fold(1.0, f64::max);

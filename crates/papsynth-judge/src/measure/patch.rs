@@ -1,4 +1,4 @@
-//! What a patch of a field looks like.
+//! Features of patches of a field.
 
 use multiversion::multiversion;
 
@@ -11,49 +11,51 @@ use crate::number::whole;
 use crate::statistics::{of_sorted, sorted};
 use crate::table::{FeatureKind, FeatureTable, Row};
 
-/// Side of a patch, pixels; smaller fields are one patch.
+/// Size of a patch, pixels. A smaller field is one patch.
 pub(crate) const PATCH_PX: usize = 200;
 
-/// Darker than this is an object, absorbance.
+/// Minimum absorbance of objects.
 pub(crate) const OBJECT: f32 = 0.04;
 
-/// Parts of a patch between these absorbances are counted.
+/// Limits of the ranges of absorbance whose fractions are features.
 const STEPS: [f32; 6] = [0.04, 0.1, 0.2, 0.3, 0.5, 0.8];
 
 /// Quantiles of absorbance.
 const QUANTILES: [f64; 7] = [0.01, 0.1, 0.25, 0.5, 0.75, 0.9, 0.99];
 
-/// Standard deviations at which ridges and blobs are looked for, pixels.
+/// Scales of ridges and blobs, pixels.
 const HESSIANS: [f64; 3] = [1.5, 3.0, 6.0];
 
-/// Gradient and window of structure tensors, pixels.
+/// Scales of the gradient and of the window of structure tensors, pixels.
 const TENSORS: [[f64; 2]; 2] = [[1.0, 3.0], [2.0, 6.0]];
 
 /// Radius and smoothing of local binary patterns, pixels.
 const PATTERNS: [(usize, f64); 3] = [(1, 0.0), (2, 1.0), (4, 2.0)];
 
-/// Differences of absorbance smaller than this are none, for patterns.
+/// Differences of absorbance below this count as zero in binary patterns.
 const TOLERANCE: f32 = 0.004;
 
-/// Patterns of eight neighbours with at most two changes have 0 to 8 of them darker; all others are one class more.
+/// Classes of binary patterns: 0 to 8 darker neighbours with at most two changes around the pixel, and one for all
+/// other patterns.
 const CLASSES: usize = 10;
 
-/// Part of a patch's blocks that count as flat.
+/// Fraction of the blocks of a patch that count as flat.
 const FLAT: f64 = 0.2;
 
-/// Maps that patches alone need.
+/// Maps that only patches use.
 struct Fine<'a> {
     maps: &'a Maps,
     gradient: [Vec<f32>; 2],
-    /// Larger and smaller eigenvalue of the second derivatives (darkness is positive: a dark ridge's is negative across).
+    /// Larger and smaller eigenvalue of the second derivatives of absorbance; the smaller one is negative at a dark
+    /// ridge.
     hessians: Vec<(Vec<f32>, Vec<f32>)>,
     /// Coherence and energy of structure tensors.
     tensors: Vec<(Vec<f32>, Vec<f32>)>,
-    /// Class of the pattern around every pixel.
+    /// Class of the binary pattern around each pixel.
     patterns: Vec<Vec<u8>>,
 }
 
-/// The features of all patches of a field.
+/// Measures all patches of a field.
 pub(crate) fn patches(maps: &Maps, control: &Control) -> Result<FeatureTable, Error> {
     control.check()?;
     let fine = Fine {
@@ -83,7 +85,7 @@ struct Window {
 }
 
 impl Window {
-    /// The values of an image in it, of which every `2^shift` pixels a side are one.
+    /// Returns the values of the window in an image that is downsampled by `2^shift`.
     fn of<T: Copy>(self, image: &[T], width: usize, shift: usize) -> impl Iterator<Item = T> {
         let rows = (self.top >> shift)..((self.top + self.high) >> shift).max((self.top >> shift) + 1);
         let columns = (self.left >> shift)..((self.left + self.wide) >> shift).max((self.left >> shift) + 1);
@@ -152,7 +154,7 @@ fn features(fine: &Fine, window: Window) -> Row {
     }
     for (classes, (radius, _)) in fine.patterns.iter().zip(PATTERNS) {
         let mut counts = [0_usize; CLASSES];
-        // The finest patterns tell of noise, wherever it is.
+        // The finest patterns measure noise, also on empty slide.
         let everywhere = radius == 1;
         for (class, o) in window.of(classes, width, 0).zip(&object) {
             if everywhere || *o {
@@ -168,10 +170,10 @@ fn features(fine: &Fine, window: Window) -> Row {
     row
 }
 
-/// Quantiles are those of every third pixel: neighbours are alike.
+/// Quantiles use every third pixel, because neighbours are correlated.
 const THINNED: usize = 3;
 
-/// Fewer pixels of objects in a patch tell nothing of their texture.
+/// Minimum number of object pixels in a patch for texture features.
 const MIN_OBJECT: usize = 400;
 
 fn edges(row: &mut Row, fine: &Fine, window: Window) {
@@ -193,7 +195,7 @@ fn edges(row: &mut Row, fine: &Fine, window: Window) {
     }
 }
 
-/// Noise of the flattest blocks: its size, and how much neighbours are alike.
+/// Adds the noise of the flattest blocks: standard deviation and correlations.
 fn noise(row: &mut Row, maps: &Maps, window: Window) {
     let places = blocks([window.left, window.top], [window.wide, window.high]);
     let mut blocks: Vec<Noise> = places.map(|at| Noise::of(&maps.grey, maps.width, at)).collect();
@@ -207,7 +209,7 @@ fn noise(row: &mut Row, maps: &Maps, window: Window) {
     }
 }
 
-/// Absorbance after a Gaussian of 0, 1 or 2 pixels.
+/// Returns the absorbance after a Gaussian of 0, 1 or 2 pixels.
 fn smoothed(maps: &Maps, sigma: f64) -> &[f32] {
     match sigma {
         0.0 => &maps.absorbance,
@@ -216,7 +218,7 @@ fn smoothed(maps: &Maps, sigma: f64) -> &[f32] {
     }
 }
 
-/// Both eigenvalues of the second derivatives in units of absorbance, the larger first.
+/// Returns both eigenvalues of the second derivatives, scaled to absorbance, the larger first.
 fn hessian(image: &[f32], width: usize, sigma: f64) -> (Vec<f32>, Vec<f32>) {
     let [dx, dy] = gradient(image, width);
     let [dxx, dxy] = gradient(&dx, width);
@@ -230,7 +232,7 @@ fn hessian(image: &[f32], width: usize, sigma: f64) -> (Vec<f32>, Vec<f32>) {
     dxx.iter().zip(&dxy).zip(&dyy).map(of_pixel).unzip()
 }
 
-/// Coherence ((λ₁ − λ₂)/(λ₁ + λ₂)) and energy (λ₁ + λ₂) of the structure tensor.
+/// Returns coherence (λ₁ − λ₂)/(λ₁ + λ₂) and energy λ₁ + λ₂ of the structure tensor.
 fn tensor(maps: &Maps, sigma: f64, window: f64) -> (Vec<f32>, Vec<f32>) {
     let [dx, dy] = gradient(smoothed(maps, sigma), maps.width);
     let product =
@@ -243,7 +245,8 @@ fn tensor(maps: &Maps, sigma: f64, window: f64) -> (Vec<f32>, Vec<f32>) {
     xx.iter().zip(&xy).zip(&yy).map(of_pixel).unzip()
 }
 
-/// Rotation-invariant uniform local binary patterns (Ojala et al., doi:10.1109/TPAMI.2002.1017623); the outermost pixels go on.
+/// Returns rotation-invariant uniform local binary patterns (Ojala et al., doi:10.1109/TPAMI.2002.1017623). Border
+/// pixels are replicated.
 fn pattern(maps: &Maps, radius: usize, sigma: f64) -> Vec<u8> {
     let image = smoothed(maps, sigma);
     let (width, height) = (maps.width, maps.height);
@@ -255,7 +258,7 @@ fn pattern(maps: &Maps, radius: usize, sigma: f64) -> Vec<u8> {
             .chain(std::iter::repeat_n(row[width - 1], radius))
     };
     let padded: Vec<f32> = (0..height + 2 * radius).flat_map(framed).collect();
-    // cos 45° = 0.7; offsets from the upper left corner of the frame.
+    // cos 45° ≈ 0.7; offsets from the upper left corner of the padded image.
     let near = (radius * 7 + 5) / 10;
     let (low, mid, high) = (radius - near, radius, radius + near);
     let ring =
@@ -272,7 +275,7 @@ fn pattern(maps: &Maps, radius: usize, sigma: f64) -> Vec<u8> {
     out
 }
 
-/// Sets a bit where a neighbour is darker.
+/// Sets a bit for each pixel with a darker neighbour.
 #[multiversion(targets = "simd")]
 fn compare(own: &[f32], neighbour: &[f32], bit: u8, to: &mut [u8]) {
     for ((bits, own), neighbour) in to.iter_mut().zip(own).zip(neighbour) {
@@ -280,7 +283,7 @@ fn compare(own: &[f32], neighbour: &[f32], bit: u8, to: &mut [u8]) {
     }
 }
 
-/// The class of each pattern of eight bits.
+/// Returns the class of each pattern of eight bits.
 fn classes() -> Vec<u8> {
     let class = |bits: u8| if (bits ^ bits.rotate_left(1)).count_ones() <= 2 { bits.count_ones() } else { 9 };
     (0..=u8::MAX).map(|bits| u8::try_from(class(bits)).unwrap_or(9)).collect()
@@ -295,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn patterns_are_those_counted_pixel_by_pixel() {
+    fn patterns_equal_a_count_pixel_by_pixel() {
         let maps = Maps::drawn(41, 37, |x, y| 120.0 + (x * x * 7.0 + y * 13.0 + x * y) % 23.0);
         for (radius, sigma) in PATTERNS {
             let image = smoothed(&maps, sigma);
@@ -318,7 +321,7 @@ mod tests {
     fn stripes_are_coherent_and_dark_lines_are_ridges() {
         let lines = |x: f64, y: f64| if (x + 2.0 * y) % 24.0 < 3.0 { 150.0 } else { 170.0 };
         let spots = |x: f64, y: f64| if x % 16.0 < 4.0 && y % 16.0 < 4.0 { 150.0 } else { 170.0 };
-        // A bright margin is the empty slide.
+        // The bright margin is empty slide.
         let field = |of: fn(f64, f64) -> f64| {
             measured(&Maps::drawn(200, 200, move |x, y| if x < 40.0 { 240.0 } else { of(x, y) }))
         };
@@ -330,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn a_field_is_cut_into_patches_from_its_corner() {
+    fn patches_start_at_the_corner_of_the_field() {
         let table = measured(&Maps::drawn(430, 250, |x, y| 200.0 + x % 7.0 + y % 5.0));
         assert_eq!(table.places, [[100.0, 100.0], [300.0, 100.0]]);
         let names: std::collections::BTreeSet<&str> = table.features.iter().map(|f| f.name.as_str()).collect();

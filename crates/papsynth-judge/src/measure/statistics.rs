@@ -1,4 +1,4 @@
-//! What a field is like as a whole.
+//! Statistics of a complete field.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -14,36 +14,37 @@ use crate::number::{nearest, single, whole};
 use crate::region::{Region, distance};
 use crate::statistics::{line_slope, median, of_sorted, sorted};
 
-/// Radii at which Ripley's K is taken, µm: 50, 100, 200 and 300 pixels of 0.33 µm.
+/// Radii of Ripley's K, µm: 50, 100, 200 and 300 pixels of 0.33 µm.
 pub const RADII_UM: [f64; 4] = [16.5, 33.0, 66.0, 99.0];
 
 /// Bins of the histogram of absorbance.
 pub const HISTOGRAM: usize = 60;
 
-/// Lower end of its first bin; what is below counts there.
+/// Lower limit of the first bin, which also counts all values below.
 pub const HISTOGRAM_FROM: f64 = -0.05;
 
-/// Width of a bin, absorbance; what is beyond the last counts there.
+/// Width of a bin, absorbance. The last bin also counts all values above.
 pub const HISTOGRAM_STEP: f64 = 0.02;
 
-/// A place is covered twice and more when it is so many times as dark as the middle of what is covered.
-const TWICE: f64 = 1.6;
+/// A pixel counts as overlap if its absorbance exceeds the median of the covered area by this factor.
+const OVERLAP: f64 = 1.6;
 
-/// Blocks of empty slide nowhere differ by more from the background, absorbance after a Gaussian of 1 pixel.
+/// Maximum deviation from the background in blocks of empty slide, absorbance after a Gaussian of 1 pixel.
 const EMPTY: f32 = 0.02;
 
-/// Declares the statistics of a field: what they are made of, then each with its value and, of single numbers, its name.
+/// Declares the statistics of a field: the arguments of the constructor, then each statistic with its value and, for
+/// scalars, its identifier.
 macro_rules! statistics {
     (
         ($($given:ident: $of:ty),*) { $($before:tt)* }
         $($(#[$meta:meta])* $field:ident: $type:ty = $value:expr $(, $name:literal)? $(, names $names:ident)?;)*
     ) => {
-        /// What a field is like as a whole; NaN where it cannot be told.
+        /// Statistics of a complete field; NaN if unknown.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         pub struct Statistics {
             $(
                 $(#[$meta])*
-                $(#[doc = concat!("\n\nIn reports: ", $name, ".")] #[serde(deserialize_with = "number")])?
+                $(#[doc = concat!("\n\nIdentifier: ", $name, ".")] #[serde(deserialize_with = "number")])?
                 pub $field: $type,
             )*
         }
@@ -54,7 +55,7 @@ macro_rules! statistics {
                 Self { $($field: $value),* }
             }
 
-            /// All single numbers, by name.
+            /// Returns all scalars with their identifiers.
             #[must_use]
             pub fn scalars(&self) -> Vec<Named> {
                 let mut all = Vec::new();
@@ -77,7 +78,7 @@ statistics! {
         let outside = maps.smooth.iter().zip(ids).filter(|(a, id)| **a > COVERED && **id == 0);
         let cytoplasm = sorted(outside.map(|(a, _)| f64::from(*a)));
         let middle = of_sorted(&cytoplasm, 0.5);
-        let layered = cytoplasm.iter().filter(|a| **a > TWICE * middle).count() as f64 / cytoplasm.len() as f64;
+        let layered = cytoplasm.iter().filter(|a| **a > OVERLAP * middle).count() as f64 / cytoplasm.len() as f64;
         let sigmas = sorted(maps.edges.iter().map(|e| e.sigma));
         let centres: Vec<[f64; 2]> = nuclei.iter().map(|n| n.shape().centre).collect();
         let (width, height) = (maps.width as f64, maps.height as f64);
@@ -88,79 +89,80 @@ statistics! {
         let [level, _, _, x2, _, y2] = maps.background.surface.0;
     }
 
-    /// Light of the empty slide, levels of 8 bits, mean over the field.
+    /// Mean light of the empty slide, grey levels of 255.
     background_dn: f64 = 255.0 * maps.background.mean(), "background, dn";
-    /// Its highest less its lowest, over its mean.
+    /// Maximum minus minimum of the light of the empty slide, over its mean.
     background_valley: f64 = maps.background.peak_to_valley(), "background, peak to valley";
-    /// Its curvature across, x from −1 to 1, over its value in the middle: level × (1 + x²·this).
+    /// Horizontal curvature c of the light, relative to the centre: level × (1 + c x²), x from −1 to 1.
     background_x2: f64 = x2 / level, "background, curvature across";
-    /// Its curvature down.
+    /// Vertical curvature of the light.
     background_y2: f64 = y2 / level, "background, curvature down";
-    /// Standard deviation of noise on empty slide, levels of 8 bits.
+    /// Standard deviation of noise on empty slide, grey levels of 255.
     noise_dn: f64 = noise_of(&|n| n.variance.sqrt()), "noise, dn";
-    /// Correlation of noise with that of the pixel to the right.
+    /// Correlation of noise with the pixel to the right.
     noise_across: f64 = noise_of(&|n| n.correlation(0)), "noise correlation across";
-    /// With that of the pixel below.
+    /// Correlation of noise with the pixel below.
     noise_down: f64 = noise_of(&|n| n.correlation(1)), "noise correlation down";
-    /// With that of the pixel to the right and below.
+    /// Correlation of noise with the pixel below right.
     noise_diagonal: f64 = noise_of(&|n| n.correlation(2)), "noise correlation diagonally";
-    /// Part of the field that is covered by anything.
+    /// Fraction of the field that is covered by objects.
     coverage: f64 = covered / pixels, "coverage";
-    /// Median absorbance of what is covered, nuclei left out.
+    /// Median absorbance of the covered area without nuclei.
     covered_a: f64 = if cytoplasm.is_empty() { f64::NAN } else { middle }, "absorbance of what is covered";
-    /// Its 90th over its 10th percentile.
+    /// 90th over 10th percentile of the absorbance of the covered area without nuclei.
     covered_range: f64 = of_sorted(&cytoplasm, 0.9) / of_sorted(&cytoplasm, 0.1), "its 90th over its 10th percentile";
-    /// Part of what is covered, nuclei left out, that is more than 1.6 times as dark as its median: flaps and overlaps.
+    /// Fraction of the covered area without nuclei whose absorbance exceeds 1.6 times the median: folds and overlaps.
     layered: f64 = layered, "part of it in layers";
-    /// Exponent of the power of absorbance against frequency.
+    /// Exponent of the power spectrum of absorbance.
     spectrum_slope: f64 = slope(&spectrum), "slope of the spectrum";
     /// 10th percentile of the blur of edges, pixels.
     edge_sigma_p10: f64 = width_at(&sigmas, 0.1), "edge sigma p10, px";
-    /// Median of it.
+    /// Median of the blur of edges, pixels.
     edge_sigma_p50: f64 = width_at(&sigmas, 0.5), "edge sigma p50, px";
-    /// Nuclei a square millimetre.
+    /// Nuclei per mm².
     nuclei_mm2: f64 = nuclei.len() as f64 / (pixels * um2) * 1e6, "nuclei a mm2";
-    /// Distance to the nearest neighbour over that of points at random.
+    /// Mean distance to the nearest nucleus over that of random points.
     clark_evans: f64 = clark_evans(&centres, width, height), "Clark-Evans";
-    /// Ripley's K over that of points at random, at [`RADII_UM`].
+    /// Ripley's K of nuclei over that of random points, at [`RADII_UM`].
     #[serde(deserialize_with = "numbers")]
     ripley: [f64; 4] = RADII_UM.map(|r| ripley(&centres, width, height, r / pixel_um)), names RIPLEY;
     /// Median area of nuclei, µm².
     nucleus_um2: f64 = middle_of(nuclei.iter().map(|n| n.pixels.len() as f64 * um2)), "area of nuclei, um2";
-    /// Free cells with one nucleus.
+    /// Number of free cells with one nucleus.
     cells: usize = cells.len();
-    /// Their median area, µm².
+    /// Median area of free cells, µm².
     cell_um2: f64 = of_cells(&|c| c.shape.area * um2), "area of free cells, um2";
     /// Median circularity of free cells.
     circularity: f64 = of_cells(&|c| c.shape.circularity), "circularity of free cells";
-    /// Median solidity of them.
+    /// Median solidity of free cells.
     solidity: f64 = of_cells(&|c| c.shape.solidity), "solidity of free cells";
-    /// Mean number of corners of them.
+    /// Mean number of corners of free cells.
     corners: f64 = cells.iter().map(|c| c.outline.corners).sum::<f64>() / cells.len() as f64, "corners of free cells";
-    /// Median part of their outline that is straight.
+    /// Median straight fraction of the outlines of free cells.
     straight: f64 = of_cells(&|c| c.outline.straight), "straight part of their outline";
-    /// Median over free cells of their absorbance in ten bins from rim to centre, over each cell's median.
+    /// Median over free cells of the absorbance in ten rings from border to centre, over the median of the cell.
     #[serde(deserialize_with = "numbers")]
     profile: [f64; PROFILE] = std::array::from_fn(|i| middle_of(profiles.iter().map(|p| p[i])));
-    /// Parts of the field in bins of absorbance, from [`HISTOGRAM_FROM`] in steps of [`HISTOGRAM_STEP`].
+    /// Fractions of the field in bins of absorbance, from [`HISTOGRAM_FROM`] in steps of [`HISTOGRAM_STEP`].
     histogram: Vec<f64> = histogram(&maps.absorbance);
     /// Logarithm to base 10 of the power of absorbance in rings of [`frequencies`].
     #[serde(deserialize_with = "numbers")]
     spectrum: [f64; RINGS] = spectrum;
 }
 
-/// Names of the single numbers of [`Statistics::ripley`].
+/// Identifiers of the values of [`Statistics::ripley`].
 const RIPLEY: [&str; 4] =
     ["K over Poisson at 16.5 um", "K over Poisson at 33 um", "K over Poisson at 66 um", "K over Poisson at 99 um"];
 
-/// A statistic's name and value.
+/// Identifier and value of a statistic.
 pub type Named = (&'static str, f64);
 
-/// Fewer nuclei have no layout.
+/// Minimum number of points of a point pattern.
 const LEAST_POINTS: usize = 5;
 
-/// Mean distance to the nearest neighbour over that of as many points thrown at random, by Clark and Evans
-/// (doi:10.2307/1931034), with Donnelly's correction for the border: below 1 clustered, above it regular. NaN of fewer than five points.
+/// Returns the mean distance to the nearest neighbour over that of as many random points (Clark and Evans,
+/// doi:10.2307/1931034), with Donnelly's border correction: below 1 clustered, above 1 regular. NaN for fewer than 5
+/// points.
 #[must_use]
 pub fn clark_evans(points: &[[f64; 2]], width: f64, height: f64) -> f64 {
     if points.len() < LEAST_POINTS {
@@ -176,7 +178,8 @@ pub fn clark_evans(points: &[[f64; 2]], width: f64, height: f64) -> f64 {
     observed / (0.5 * (area / n).sqrt() + (0.0514 + 0.041 / n.sqrt()) * border / n)
 }
 
-/// Ripley's K over that of points at random, πr², with the translation correction: above 1 clustered. NaN of fewer than five points.
+/// Returns Ripley's K over that of random points, πr², with the translation correction: above 1 clustered. NaN for
+/// fewer than 5 points.
 #[must_use]
 pub fn ripley(points: &[[f64; 2]], width: f64, height: f64, radius: f64) -> f64 {
     if points.len() < LEAST_POINTS {
@@ -187,7 +190,7 @@ pub fn ripley(points: &[[f64; 2]], width: f64, height: f64, radius: f64) -> f64 
     for (i, a) in points.iter().enumerate() {
         for b in &points[i + 1..] {
             if distance(*a, *b) <= radius {
-                // A pair so far apart is seen only where it fits into the field.
+                // Translation correction: the area of positions at which this pair fits into the field.
                 let fits = (width - (a[0] - b[0]).abs()).max(1.0) * (height - (a[1] - b[1]).abs()).max(1.0);
                 sum += 2.0 * area / fits;
             }
@@ -197,7 +200,7 @@ pub fn ripley(points: &[[f64; 2]], width: f64, height: f64, radius: f64) -> f64 
     area / (n * (n - 1.0)) * sum / (PI * radius * radius)
 }
 
-/// The median of what is known; NaN of nothing.
+/// Returns the median of the finite values; NaN for none.
 fn middle_of(values: impl Iterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
     if values.is_empty() { f64::NAN } else { median(&mut values) }
@@ -211,7 +214,7 @@ fn histogram(absorbance: &[f32]) -> Vec<f64> {
     counts.iter().map(|c| c / absorbance.len() as f64).collect()
 }
 
-/// Noise of the empty slide, or of the flattest thirtieth of the field where nothing is empty.
+/// Returns the noise of the empty slide, or of the flattest 1/30 of the field if there is no empty slide.
 fn empty_noise(maps: &Maps) -> Option<Noise> {
     const LEAST: usize = 8;
     const FLATTEST: f64 = 1.0 / 30.0;
@@ -229,7 +232,7 @@ fn empty_noise(maps: &Maps) -> Option<Noise> {
     Noise::mean(&mut blocks)
 }
 
-/// JSON has no NaN: it is written as null.
+/// Reads null as NaN, because JSON has no NaN.
 fn number<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     Option::<f64>::deserialize(from).map(|v| v.unwrap_or(f64::NAN))
 }
@@ -238,31 +241,32 @@ fn numbers<'de, D: serde::Deserializer<'de>, const N: usize>(from: D) -> Result<
     let values = Vec::<Option<f64>>::deserialize(from)?;
     let values: Vec<f64> = values.into_iter().map(|v| v.unwrap_or(f64::NAN)).collect();
     let count = values.len();
-    values.try_into().map_err(|_| serde::de::Error::invalid_length(count, &"as many numbers as were written"))
+    values.try_into().map_err(|_| serde::de::Error::invalid_length(count, &"the length of the array in the report"))
 }
 
-/// Side of the windows whose spectra are averaged, pixels.
+/// Size of the windows whose spectra are averaged, pixels.
 const SIDE: usize = 256;
 
-/// Rings of frequency, cycles a pixel, each by half an octave beyond the one before.
+/// Number of frequency rings, each half an octave wide.
 const RINGS: usize = 12;
 
-/// Lowest frequency of the lowest ring.
+/// Lower limit of the lowest ring, cycles per pixel.
 const LOWEST: f64 = 1.0 / 128.0;
 
-/// The slope is measured between these frequencies, cycles a pixel: below lie whole cells, above noise.
+/// Range of frequencies of the slope, cycles per pixel: between complete cells and noise.
 const MEASURED: [f64; 2] = [0.02, 0.15];
 
-/// Middle of each ring, cycles a pixel.
+/// Returns the centre of each ring, cycles per pixel.
 #[must_use]
 pub fn frequencies() -> [f64; RINGS] {
     std::array::from_fn(|i| LOWEST * libm::exp2((i as f64 + 0.5) / 2.0))
 }
 
-/// Logarithm to base 10 of the mean power a square cycle in each ring, of windows with a cosine's rim; NaN of no such frequency.
+/// Returns the mean power in each ring, as a logarithm to base 10, over Hann windows; NaN if a ring contains no
+/// frequency.
 fn rings(image: &[f32], width: usize) -> [f64; RINGS] {
     let height = image.len() / width;
-    // The largest power of two that fits: windows never overlap.
+    // The largest power of two that fits. Windows do not overlap.
     let side = [SIDE, width, height].into_iter().min().unwrap_or(1);
     let side = if side.is_power_of_two() { side } else { side.next_power_of_two() / 2 };
     let transform = FftPlannerScalar::new().plan_fft_forward(side);
@@ -278,7 +282,7 @@ fn rings(image: &[f32], width: usize) -> [f64; RINGS] {
     std::array::from_fn(|i| if counts[i] > 0.0 { libm::log10((sums[i] / counts[i]).max(1e-12)) } else { f64::NAN })
 }
 
-/// |F|² of a window, normalised so that its mean over all frequencies is the variance.
+/// Returns |F|² of a window, normalised so that the mean over all frequencies is the variance.
 fn power(at: &dyn Fn(usize, usize) -> f32, side: usize, rim: &[f32], transform: &Arc<dyn Fft<f32>>) -> Vec<f32> {
     let mean = (0..side).flat_map(|y| (0..side).map(move |x| (x, y))).map(|(x, y)| f64::from(at(x, y))).sum::<f64>()
         / (side * side) as f64;
@@ -305,7 +309,7 @@ fn add(power: &[f32], side: usize, sums: &mut [f64; RINGS], counts: &mut [f64; R
     }
 }
 
-/// The exponent of the power law through the rings between whole cells and noise.
+/// Returns the exponent of the power law through the rings in the range of the slope.
 fn slope(rings: &[f64; RINGS]) -> f64 {
     let known = frequencies().into_iter().zip(*rings);
     let (x, y): (Vec<f64>, Vec<f64>) = known
@@ -328,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn points_at_random_have_one_and_one() {
+    fn clark_evans_and_ripley_of_random_points_are_1() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(9);
         let fields: Vec<Vec<[f64; 2]>> = (0..300).map(|_| random(29, &mut rng)).collect();
         let check = |values: Vec<f64>, what: &str| {
@@ -354,12 +358,12 @@ mod tests {
     }
 
     #[test]
-    fn white_noise_is_flat_and_has_its_variance() {
+    fn the_spectrum_of_white_noise_is_its_variance() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
         // Uniform over ±1: variance 1/3.
         let image: Vec<f32> = (0..512 * 256).map(|_| single(below(200_001, &mut rng) as f64 / 1e5 - 1.0)).collect();
         let rings = rings(&image, 512);
-        // From here on a ring has 300 coefficients: an error of 6 %.
+        // These rings have 300 coefficients or more: a standard error of 6 % or less.
         for ring in &rings[6..] {
             assert!((ring - libm::log10(1.0 / 3.0)).abs() < 0.08, "{rings:?}");
         }
@@ -367,7 +371,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wave_is_in_the_ring_of_its_frequency() {
+    fn the_power_of_a_wave_is_in_the_ring_of_its_frequency() {
         let image: Vec<f32> =
             (0..256 * 256).map(|i| single(libm::sin(std::f64::consts::TAU * 0.11 * (i % 256) as f64))).collect();
         let rings = rings(&image, 256);
@@ -377,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn the_slope_is_the_exponent() {
+    fn the_slope_of_a_power_law_is_its_exponent() {
         let rings = frequencies().map(|f| 1.5 - 3.2 * libm::log10(f));
         assert!((slope(&rings) + 3.2).abs() < 1e-9);
         assert!(slope(&[f64::NAN; RINGS]).is_nan());

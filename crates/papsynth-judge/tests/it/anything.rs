@@ -1,4 +1,4 @@
-//! Whatever the pixels, nothing panics.
+//! Arbitrary images do not cause panics.
 
 use papsynth_judge::{
     FieldImage, Judge, JudgeParams, Measurer, MeasurerParams, NucleiAnnotation, NucleiFrom, TwoSampleParams,
@@ -19,7 +19,7 @@ fn grey(kind: u8, i: usize, width: usize, seed: u64) -> f32 {
     f32::from(u8::try_from(level.min(255)).unwrap())
 }
 
-fn picture(kind: u8, width: usize, height: usize, seed: u64, known: u8) -> FieldImage {
+fn image(kind: u8, width: usize, height: usize, seed: u64, known: u8) -> FieldImage {
     let pixels = width * height;
     let nuclei = match known {
         0 => NucleiAnnotation::None,
@@ -36,27 +36,27 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
 
     #[test]
-    fn any_picture_is_measured_or_refused(
+    fn any_image_is_measured_or_an_error(
         kind in 0_u8..6, known in 0_u8..3, width in 1_usize..120, height in 1_usize..120, seed: u64, pixel_um in 0.02_f64..10.0,
         from in 0_usize..3,
     ) {
         let nuclei_from = NucleiFrom::ALL[from];
         let measurer = Measurer::new(&MeasurerParams { pixel_um, nuclei_from, ..MeasurerParams::default() }).unwrap();
-        let picture = picture(kind, width, height, seed, known);
-        if let Ok(field) = measurer.measure(&picture) {
+        let image = image(kind, width, height, seed, known);
+        if let Ok(field) = measurer.measure(&image) {
             prop_assert_eq!(field.nuclei.values.len(), field.nuclei.len() * field.nuclei.features.len());
             prop_assert_eq!(field.patches.len(), 1);
             let parts: f64 = field.statistics.histogram.iter().sum();
             prop_assert!((parts - 1.0).abs() < 1e-9);
         }
-        let coarse = picture.coarsened(pixel_um);
+        let coarse = image.coarsened(pixel_um);
         prop_assert!(coarse.grey.iter().all(|g| (0.0..=255.01).contains(g)));
     }
 
     #[test]
-    fn any_sets_of_fields_are_judged(kinds in proptest::collection::vec(0_u8..6, 5), seed: u64) {
+    fn any_sets_of_fields_are_compared(kinds in proptest::collection::vec(0_u8..6, 5), seed: u64) {
         let measurer = Measurer::new(&MeasurerParams::default()).unwrap();
-        let measured: Vec<_> = kinds.iter().filter_map(|k| measurer.measure(&picture(*k, 64, 48, seed ^ u64::from(*k), 0)).ok()).collect();
+        let measured: Vec<_> = kinds.iter().filter_map(|k| measurer.measure(&image(*k, 64, 48, seed ^ u64::from(*k), 0)).ok()).collect();
         let two_sample = TwoSampleParams { trees: 20, half_splits: 1, bootstrap: 10, permuted: 2, folds: 2 };
         let judge = Judge::new(&JudgeParams { two_sample, draws: 20, seed, ..JudgeParams::default() }).unwrap();
         if measured.len() >= 4 {

@@ -12,13 +12,13 @@ use crate::support::Toy;
 const FIELDS: u64 = 8;
 
 fn fields(toy: Toy, seed: u64) -> Vec<Field> {
-    measured(&toy.pictures(FIELDS, seed))
+    measured(&toy.images(FIELDS, seed))
 }
 
-fn measured(pictures: &[FieldImage]) -> Vec<Field> {
+fn measured(images: &[FieldImage]) -> Vec<Field> {
     let measurer =
         Measurer::new(&MeasurerParams { nuclei_from: NucleiFrom::Points, ..MeasurerParams::default() }).unwrap();
-    pictures.iter().map(|p| measurer.measure(p).unwrap()).collect()
+    images.iter().map(|p| measurer.measure(p).unwrap()).collect()
 }
 
 fn judge() -> Judge {
@@ -78,8 +78,8 @@ fn the_most_important_feature_is_of_the_changed_kind() {
 
 #[test]
 fn uniform_noise_and_blurred_copies_are_distinguishable() {
-    let pictures = Toy::default().pictures(FIELDS, 100);
-    let real = measured(&pictures);
+    let images = Toy::default().images(FIELDS, 100);
+    let real = measured(&images);
     let noise = |p: &FieldImage| {
         let mut state = 1_u64;
         let mut next = || {
@@ -92,14 +92,14 @@ fn uniform_noise_and_blurred_copies_are_distinguishable() {
             ..p.clone()
         }
     };
-    let noise: Vec<FieldImage> = pictures.iter().map(noise).collect();
+    let noise: Vec<FieldImage> = images.iter().map(noise).collect();
     let report = judge().compare(&real, &measured(&noise)).unwrap();
     assert_eq!(test(&report, "patches").conclusion, Conclusion::Distinguishable);
     // Noise has no nuclei.
     assert!(report.warnings.iter().any(|w| w.starts_with("nuclei: not compared")), "{:?}", report.warnings);
 
     let blurred: Vec<FieldImage> =
-        pictures.iter().map(|p| FieldImage { grey: blur(&p.grey, p.width), ..p.clone() }).collect();
+        images.iter().map(|p| FieldImage { grey: blur(&p.grey, p.width), ..p.clone() }).collect();
     let report = judge().compare(&real, &measured(&blurred)).unwrap();
     assert_eq!(report.conclusion, Conclusion::Distinguishable);
     assert!(test(&report, "patches").result.auc > 0.99);
@@ -137,8 +137,8 @@ fn nuclei_of_another_grade_in_similar_fields_are_distinguishable() {
 #[test]
 fn nuclei_of_common_groups_are_tested_separately() {
     let grouped = |seed: u64| {
-        let pictures = Toy::default().pictures(FIELDS, seed);
-        let named = pictures
+        let images = Toy::default().images(FIELDS, seed);
+        let named = images
             .into_iter()
             .enumerate()
             .map(|(i, p)| FieldImage { group: if i < 4 { "N" } else { "H" }.to_owned(), ..p });
@@ -178,7 +178,7 @@ fn a_report_is_read_back_and_its_page_is_self_contained() {
         assert!(!page.contains(loaded), "{loaded}");
     }
     assert_eq!(page.matches("src=\"").count(), page.matches("src=\"data:image/png;base64,").count());
-    // No crops in the numbers.
+    // JSON contains no crops.
     assert!(!text.contains("base64"));
 }
 
@@ -189,7 +189,7 @@ fn too_few_fields_and_other_measurement_parameters_are_errors() {
     assert_eq!(judge().compare(&real, &[]).unwrap_err(), Error::Fields { side: "synthetic", count: 0, least: 2 });
     let measurer = Measurer::new(&MeasurerParams { pixel_um: 0.25, ..MeasurerParams::default() }).unwrap();
     let other =
-        [measurer.measure(&Toy::default().picture(1)).unwrap(), measurer.measure(&Toy::default().picture(2)).unwrap()];
+        [measurer.measure(&Toy::default().image(1)).unwrap(), measurer.measure(&Toy::default().image(2)).unwrap()];
     assert!(matches!(judge().compare(&real, &other), Err(Error::Measurer { .. })));
     for (params, field) in [
         (JudgeParams { paper_nuclei: 7, ..JudgeParams::default() }, "paper_nuclei"),

@@ -1,22 +1,22 @@
-//! Toy fields: round cells with round nuclei on a lit slide, each made of numbers that are known.
+//! Toy fields: round cells with round nuclei, with known properties.
 
 use papsynth_judge::{FieldImage, NucleiAnnotation};
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// What toy fields are like.
+/// Properties of toy fields.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Toy {
     pub(crate) width: usize,
     pub(crate) height: usize,
     pub(crate) cells: usize,
-    /// Standard deviation of the Gaussian that blurs every rim, pixels.
+    /// Blur of all borders: standard deviation of a Gaussian, pixels.
     pub(crate) blur: f64,
-    /// Absorbance of nuclei above that of their cells.
+    /// Absorbance of nuclei above that of cells.
     pub(crate) nucleus_a: f64,
     /// Mean radius of nuclei, pixels.
     pub(crate) nucleus_px: f64,
-    /// Standard deviation of noise, levels of 255.
+    /// Standard deviation of noise, grey levels of 255.
     pub(crate) noise: f64,
 }
 
@@ -32,15 +32,15 @@ struct Disc {
     centre: [f64; 2],
     radius: f64,
     a: f64,
-    /// Grain of its absorbance: strength and frequency.
+    /// Strength and frequency of the texture of absorbance.
     grain: [f64; 2],
 }
 
 impl Toy {
-    /// A field of a seed; its nuclei are known by points.
-    pub(crate) fn picture(&self, seed: u64) -> FieldImage {
+    /// Returns the field of a seed, with annotated points.
+    pub(crate) fn image(&self, seed: u64) -> FieldImage {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        // Slides differ: strength of stain and of grain.
+        // Stain and texture differ between slides.
         let (stain, grain) = (1.0 + 0.15 * normal(&mut rng), 0.03 * (1.0 + 0.2 * normal(&mut rng)));
         let mut discs = Vec::new();
         let mut points = Vec::new();
@@ -70,7 +70,7 @@ impl Toy {
                 let (u, v) = (2.0 * x as f64 / self.width as f64 - 1.0, 2.0 * y as f64 / self.height as f64 - 1.0);
                 let lamp = 230.0 * (1.0 - 0.03 * u * u - 0.01 * v * v);
                 let light = lamp * libm::pow(10.0, -a) + self.noise * normal(&mut rng);
-                #[expect(clippy::cast_possible_truncation, reason = "f32 is what pixels are kept in")]
+                #[expect(clippy::cast_possible_truncation, reason = "pixels are f32")]
                 grey.push(light.round().clamp(0.0, 255.0) as f32);
             }
         }
@@ -78,9 +78,9 @@ impl Toy {
         FieldImage { name, grey, width: self.width, nuclei: NucleiAnnotation::Points(points), ..FieldImage::default() }
     }
 
-    /// Fields of seeds that follow each other.
-    pub(crate) fn pictures(&self, count: u64, seed: u64) -> Vec<FieldImage> {
-        (seed..seed + count).map(|seed| self.picture(seed)).collect()
+    /// Returns the fields of consecutive seeds.
+    pub(crate) fn images(&self, count: u64, seed: u64) -> Vec<FieldImage> {
+        (seed..seed + count).map(|seed| self.image(seed)).collect()
     }
 }
 
@@ -97,12 +97,12 @@ impl Disc {
     }
 }
 
-/// A number between 0 and 1.
+/// Draws a uniform number from 0 to 1.
 pub(crate) fn uniform(rng: &mut Xoshiro256PlusPlus) -> f64 {
     (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// A normal number, by Box and Muller.
+/// Draws a standard normal number by the Box–Muller method.
 pub(crate) fn normal(rng: &mut Xoshiro256PlusPlus) -> f64 {
     let radius = (-2.0 * libm::log(1.0 - uniform(rng))).sqrt();
     radius * libm::cos(std::f64::consts::TAU * uniform(rng))

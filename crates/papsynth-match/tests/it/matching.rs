@@ -13,7 +13,7 @@ use papsynth_match::{
 };
 use rayon::prelude::*;
 
-/// Coarse pixels: many cells in few of them, with slide between them.
+/// Coarse pixels: many cells in a small image, with empty slide.
 const PIXEL_UM: f64 = 0.5;
 const FIELD: [usize; 2] = [280, 210];
 
@@ -33,7 +33,7 @@ fn setting(size_px: [usize; 2]) -> Setting {
     }
 }
 
-/// Fields of a microscope that differs from the preset.
+/// Simulates fields of a recipe that differs from the preset.
 fn fields(count: u64, from: NucleiFrom) -> Vec<FieldImage> {
     let view = WindowSampler::new(FIELD, PIXEL_UM, from).unwrap();
     let setting = setting(FIELD);
@@ -42,7 +42,7 @@ fn fields(count: u64, from: NucleiFrom) -> Vec<FieldImage> {
         (Parameter::Level, 0.8),
         (Parameter::LevelSd, 0.005),
         (Parameter::Noise, 3.0),
-        (Parameter::Down, 0.3),
+        (Parameter::NoiseCorrelationY, 0.3),
         (Parameter::Blur, 0.5),
         (Parameter::Cells, 400.0),
     ] {
@@ -63,11 +63,11 @@ fn on_threads(threads: usize, fields: &[FieldImage], matching: &Match) -> Fit {
 }
 
 #[test]
-fn a_recipe_is_found_and_is_the_same_with_any_number_of_threads() {
+fn a_match_does_not_depend_on_the_number_of_threads() {
     let fields = fields(3, NucleiFrom::Masks);
     let matching = small(PixelSize::Known(PIXEL_UM), 2);
     let [one, two] = [1, 2].map(|threads| on_threads(threads, &fields, &matching));
-    // As text: what is unknown is not equal to itself.
+    // Compared as text, because NaN differs from itself.
     let text = |fit: &Fit| serde_json::to_string(fit).unwrap();
     assert!(text(&one) == text(&two), "{}\n{}", one.to_toml(), two.to_toml());
     assert_eq!(one.to_toml(), two.to_toml());
@@ -93,7 +93,7 @@ fn a_recipe_is_found_and_is_the_same_with_any_number_of_threads() {
 }
 
 #[test]
-fn the_size_of_a_pixel_is_sought_where_it_is_asked_for() {
+fn the_pixel_size_is_estimated_on_request() {
     let fields = fields(6, NucleiFrom::Masks);
     let fit = on_threads(2, &fields, &small(PixelSize::Sought(0.4), 0));
     let has = |parameter: Parameter| fit.parameters.iter().any(|a| a.parameter == parameter);
@@ -103,7 +103,7 @@ fn the_size_of_a_pixel_is_sought_where_it_is_asked_for() {
 }
 
 #[test]
-fn what_is_asked_for_in_vain_is_told() {
+fn invalid_fields_and_parameters_are_errors_and_the_stop_flag_ends_a_match() {
     let flat = |name: &str, width: usize, of: &dyn Fn(usize) -> f32| FieldImage {
         name: name.to_owned(),
         group: String::new(),
@@ -126,7 +126,7 @@ fn what_is_asked_for_in_vain_is_told() {
         let message = run(&fields);
         assert!(message.contains(&format!("`{what}`")), "{what}: {message}");
     }
-    // Noise without anything on it.
+    // Noise without objects.
     let message = run(&[flat("a", 160, &noisy), flat("b", 160, &noisy)]);
     assert!(message.contains("nuclei") && message.contains("pixel"), "{message}");
 
@@ -155,9 +155,9 @@ fn what_is_asked_for_in_vain_is_told() {
     assert_eq!(small(PixelSize::Known(PIXEL_UM), 0).run(&fields, &engine, &control), Err(Error::Stopped));
 }
 
-/// `examples/recover.rs` in small.
+/// A small version of `examples/recover.rs`.
 #[test]
-fn recipes_that_were_not_seen_are_recovered() {
+fn parameters_of_held_out_recipes_are_recovered() {
     const TRIALS: usize = 8;
     const WINDOWS: usize = 2;
     const SEED: u64 = 71;
@@ -184,7 +184,7 @@ fn recipes_that_were_not_seen_are_recovered() {
         let key = |k: usize| Key { seed: SEED, index: (row * WINDOWS + k) as u64 };
         (0..WINDOWS).map(|k| view.simulate_field(&engine, key(k)).unwrap()).collect()
     };
-    // Pairs, and how many of them hold the truth: those found by simulation, and those measured.
+    // Number of pairs and of covered pairs: simulated, measured.
     let counts: Vec<[[usize; 2]; 2]> = (0..TRIALS)
         .into_par_iter()
         .map(|row| {
@@ -209,7 +209,7 @@ fn recipes_that_were_not_seen_are_recovered() {
         let sum = |k: usize| counts.iter().map(|c| c[which][k]).sum::<usize>() as f64;
         (sum(0), sum(1) / sum(0))
     };
-    // Of 95 %, by three standard errors; those of one trial hang together, as if there were a third as many.
+    // 95 % minus three standard errors. The parameters of a trial are correlated, so a third of the pairs count.
     for which in [0, 1] {
         let (pairs, held) = part(which);
         assert!(held > 0.95 - 3.0 * (0.95 * 0.05 / (pairs / 3.0)).sqrt(), "{which}: {held} of {pairs}");

@@ -1,4 +1,4 @@
-//! What is written is read back, by us and by zarrs; what is damaged is found.
+//! Shards are read back by this crate and by zarrs; damage is found.
 
 #![allow(clippy::cast_possible_truncation, reason = "the numbers are small")]
 
@@ -6,28 +6,28 @@ use std::io::Cursor;
 use std::sync::Arc;
 
 use papsynth_zarr::{
-    Array, Channel, Error, Form, Image, Kind, Pyramid, Sample, Shard, ShardEncoder, ShardReader, Space, Tiling, halved,
-    shard_bytes,
+    Array, Channel, Coordinates, DataType, Error, Image, Pyramid, PyramidShape, Sample, Shard, ShardEncoder,
+    ShardReader, Tiling, halved, shard_bytes,
 };
 use proptest::prelude::*;
 use zarrs::array::{Array as Theirs, ArraySubset, Element, ElementOwned};
 use zarrs::storage::store::MemoryStore;
 use zarrs::storage::{Bytes, StoreKey, WritableStorageTraits};
 
-/// Noise: the same number at the same place.
+/// Deterministic noise.
 fn noise(number: usize) -> u32 {
     let mut state = (number as u64).wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
     state ^= state >> 29;
     (state.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 33) as u32
 }
 
-/// The values of a whole array; every seventh is 0, and so is its first quarter.
+/// The values of an array; each seventh and the first quarter are 0.
 fn values<T: Sample>(array: &Array, from: impl Fn(u32) -> T) -> Vec<T> {
     let count: usize = array.shape().iter().product();
     (0..count).map(|i| if i % 7 == 0 || i < count / 4 { T::default() } else { from(noise(i)) }).collect()
 }
 
-/// Those of one shard.
+/// The values of a shard.
 fn block_of<T: Sample>(array: &Array, all: &[T], shard: Shard) -> Vec<T> {
     let [channels, planes, rows, columns] = array.shape();
     let block = array.block(shard).unwrap();
@@ -43,11 +43,11 @@ fn block_of<T: Sample>(array: &Array, all: &[T], shard: Shard) -> Vec<T> {
     found
 }
 
-fn array(form: &Form) -> Array {
-    Pyramid::new(form).unwrap().levels()[0].clone()
+fn array(shape: &PyramidShape) -> Array {
+    Pyramid::new(shape).unwrap().levels()[0].clone()
 }
 
-/// Every shard of an array by the code of zarrs.
+/// Writes all shards of an array and reads them with zarrs.
 fn read_by_zarrs<T: Sample + Element + ElementOwned>(array: &Array, all: &[T]) -> Vec<T> {
     let store = Arc::new(MemoryStore::new());
     let put = |path: &str, bytes: Vec<u8>| {
@@ -67,7 +67,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
     #[test]
-    fn zarrs_and_we_read_what_we_write(
+    fn shards_are_read_back_by_this_crate_and_by_zarrs(
         [width, height, chunk] in [1_usize..70, 1_usize..70, 1_usize..20],
         doublings in 0_u32..3,
         channels in prop::option::of(1_usize..4),
@@ -76,12 +76,12 @@ proptest! {
         kind in 0..4,
     ) {
         let tiling = Tiling { chunk, shard: chunk << doublings, planes: shard_planes };
-        let form = |kind| Form { kind, channels, planes, height, width, tiling, levels: 1 };
+        let shape = |kind| PyramidShape { kind, channels, planes, height, width, tiling, levels: 1 };
         match kind {
-            0 => agree(&array(&form(Kind::U8)), |v| v as u8)?,
-            1 => agree(&array(&form(Kind::U16)), |v| v as u16)?,
-            2 => agree(&array(&form(Kind::U32)), |v| v)?,
-            _ => agree(&array(&form(Kind::F32)), |v| v as f32 / 7.0)?,
+            0 => agree(&array(&shape(DataType::U8)), |v| v as u8)?,
+            1 => agree(&array(&shape(DataType::U16)), |v| v as u16)?,
+            2 => agree(&array(&shape(DataType::U32)), |v| v)?,
+            _ => agree(&array(&shape(DataType::F32)), |v| v as f32 / 7.0)?,
         }
     }
 }
@@ -105,7 +105,7 @@ fn agree<T: Sample + Element + ElementOwned + std::fmt::Debug>(
             }
         }
         prop_assert_eq!(&found, &due);
-        // A region in the middle of the last plane.
+        // A region in the centre of the last plane.
         let part = |range: &std::ops::Range<usize>| range.start + range.len() / 3..range.end - range.len() / 4;
         let (rows, wide) = (part(&block.rows), part(&block.columns));
         let plane = block.planes.end - 1;
@@ -118,14 +118,22 @@ fn agree<T: Sample + Element + ElementOwned + std::fmt::Debug>(
     Ok(())
 }
 
-/// Three channels of two planes in several chunks.
+/// Three channels and two planes in several chunks.
 fn small() -> Array {
     let tiling = Tiling { chunk: 8, shard: 32, planes: 2 };
-    array(&Form { kind: Kind::U16, channels: Some(3), planes: Some(2), height: 20, width: 29, tiling, levels: 1 })
+    array(&PyramidShape {
+        kind: DataType::U16,
+        channels: Some(3),
+        planes: Some(2),
+        height: 20,
+        width: 29,
+        tiling,
+        levels: 1,
+    })
 }
 
 #[test]
-fn planes_may_come_in_any_order_and_each_must() {
+fn planes_are_written_in_any_order_and_all_are_required() {
     let (array, shard) = (small(), Shard::default());
     let all = values(&array, |v| v as u16);
     let pixels = array.block(shard).unwrap().pixels();
@@ -134,24 +142,24 @@ fn planes_may_come_in_any_order_and_each_must() {
     for (plane, channel) in [(1, 2), (0, 0), (1, 0), (0, 2), (0, 1), (1, 1)] {
         bytes.extend(encoder.plane(channel, plane, &all[(channel * 2 + plane) * pixels..][..pixels]).unwrap());
     }
-    assert!(encoder.plane(1, 1, &all[..pixels]).unwrap_err().to_string().contains("written already"));
+    assert!(encoder.plane(1, 1, &all[..pixels]).unwrap_err().to_string().contains("already written"));
     bytes.extend(encoder.end().unwrap());
     let mut reader = ShardReader::open(&array, shard, Cursor::new(&bytes)).unwrap();
     assert_eq!(reader.plane::<u16>(2, 1).unwrap(), all[5 * pixels..]);
-    // The same values give the same bytes.
+    // Equal values give equal bytes.
     assert_eq!(shard_bytes(&array, shard, &all).unwrap(), shard_bytes(&array, shard, &all).unwrap());
     let mut encoder = ShardEncoder::new(&array, shard).unwrap();
-    assert!(encoder.plane(0, 0, &[0_u8; 580]).unwrap_err().to_string().contains("uint8 for an array of uint16"));
+    assert!(encoder.plane(0, 0, &[0_u8; 580]).unwrap_err().to_string().contains("uint8 to an array of uint16"));
     assert!(encoder.plane(0, 0, &[0_u16; 579]).unwrap_err().to_string().contains("579 values"));
     assert!(encoder.plane(3, 0, &[0_u16; 580]).is_err() && encoder.plane(0, 2, &[0_u16; 580]).is_err());
-    assert!(encoder.end().unwrap_err().to_string().contains("channel 0 of plane 0 was not written"));
+    assert!(encoder.end().unwrap_err().to_string().contains("channel 0 of plane 0 is missing"));
     assert!(shard_bytes(&array, shard, &all[1..]).is_err());
     assert!(ShardEncoder::new(&array, Shard { z: 1, y: 0, x: 0 }).is_err());
     assert!(reader.plane::<u8>(0, 0).is_err() && reader.plane::<u16>(3, 0).is_err());
     assert!(reader.region::<u16>(0, 0, 0..21, 0..1).is_err());
 }
 
-/// Every plane of a shard, or what is wrong with it.
+/// Reads all planes of a shard.
 fn read_all(array: &Array, bytes: &[u8]) -> Result<Vec<u16>, Error> {
     let mut reader = ShardReader::open(array, Shard::default(), Cursor::new(bytes))?;
     let mut found = Vec::new();
@@ -162,7 +170,7 @@ fn read_all(array: &Array, bytes: &[u8]) -> Result<Vec<u16>, Error> {
 }
 
 #[test]
-fn zeros_are_written_and_every_bit_that_turns_over_or_byte_that_lacks_is_found() {
+fn zeros_are_written_and_flipped_bits_and_missing_bytes_are_found() {
     let array = small();
     let all = values(&array, |v| v as u16);
     let bytes = shard_bytes(&array, Shard::default(), &all).unwrap();
@@ -170,7 +178,7 @@ fn zeros_are_written_and_every_bit_that_turns_over_or_byte_that_lacks_is_found()
     for bit in (0..bytes.len() * 8).step_by(37) {
         let mut changed = bytes.clone();
         changed[bit / 8] ^= 1 << (bit % 8);
-        // A few bits of zstd's headers mean nothing; then nothing else may change.
+        // A few header bits of zstd have no effect; the values must not change.
         match read_all(&array, &changed) {
             Ok(found) => assert!(found == all, "bit {bit}"),
             Err(error) => assert!(matches!(error, Error::Damaged { .. }), "bit {bit}: {error}"),
@@ -181,14 +189,14 @@ fn zeros_are_written_and_every_bit_that_turns_over_or_byte_that_lacks_is_found()
     }
     let longer = [&bytes[..], &[0]].concat();
     assert!(matches!(read_all(&array, &longer), Err(Error::Damaged { .. })));
-    // The index of an array of zeros names every chunk, too.
+    // The index of an array of zeros has all chunks.
     let zeros = shard_bytes(&array, Shard::default(), &vec![0_u16; all.len()]).unwrap();
     assert_eq!(read_all(&array, &zeros).unwrap(), vec![0; all.len()]);
 }
 
-/// The index of a shard changed, with its checksum.
+/// Changes the index of a shard and its checksum.
 fn with_index(bytes: &[u8], change: impl FnOnce(&mut Vec<u64>)) -> Vec<u8> {
-    // Three channels of two planes of four by four chunks.
+    // Three channels x two planes x 4 x 4 chunks.
     let data = bytes.len() - 3 * 2 * 16 * 16 - 4;
     let index = &bytes[data..bytes.len() - 4];
     let mut numbers: Vec<u64> = index.chunks(8).map(|b| u64::from_le_bytes(b.try_into().unwrap())).collect();
@@ -201,7 +209,7 @@ fn with_index(bytes: &[u8], change: impl FnOnce(&mut Vec<u64>)) -> Vec<u8> {
 }
 
 #[test]
-fn indices_that_lie_and_chunks_that_swell_are_refused() {
+fn wrong_indices_and_oversized_chunks_are_refused() {
     let array = small();
     let bytes = shard_bytes(&array, Shard::default(), &values(&array, |v| v as u16)).unwrap();
     assert!(read_all(&array, &with_index(&bytes, |_| ())).is_ok());
@@ -210,14 +218,14 @@ fn indices_that_lie_and_chunks_that_swell_are_refused() {
         assert!(matches!(error, Error::Damaged { .. }) && error.to_string().contains(what), "{error}");
     };
     says(with_index(&bytes, |index| index[..2].fill(u64::MAX)), "chunk 0 is missing");
-    says(with_index(&bytes, |index| index[0] = u64::MAX - 1), "chunk 0 is said");
-    says(with_index(&bytes, |index| index[1] = 1 << 60), "chunk 0 is said");
-    says(with_index(&bytes, |index| index[1] -= 1), "belong to no chunk");
-    // All chunks the same, as long as they may be.
-    says(with_index(&bytes, |index| index[1] += 1), "more bytes than it");
-    // Four chunks across a row of 29 pixels are all there; of four rows the last is not.
-    says(with_index(&bytes, |index| index[24..26].fill(0)), "chunk 12 lies outside");
-    // A chunk of zeros of 1 GiB, and one whose header promises more than any memory holds.
+    says(with_index(&bytes, |index| index[0] = u64::MAX - 1), "in the index");
+    says(with_index(&bytes, |index| index[1] = 1 << 60), "in the index");
+    says(with_index(&bytes, |index| index[1] -= 1), "do not belong to a chunk");
+    // A chunk that overlaps the next.
+    says(with_index(&bytes, |index| index[1] += 1), "more bytes than the file");
+    // 29 columns have four chunks; 20 rows have three.
+    says(with_index(&bytes, |index| index[24..26].fill(0)), "chunk 12 is outside");
+    // A chunk that decompresses to 4 MiB, and one with a size of 2⁶⁰ bytes in its header.
     let first = {
         let mut size = 0;
         with_index(&bytes, |index| size = index[1]);
@@ -229,22 +237,22 @@ fn indices_that_lie_and_chunks_that_swell_are_refused() {
     header.splice(5..6, (1_u64 << 60).to_le_bytes());
     for chunk in [bomb, header] {
         assert!(chunk.len() < 300, "{}", chunk.len());
-        let swollen = [&chunk, &bytes[first..]].concat();
+        let enlarged = [&chunk, &bytes[first..]].concat();
         let [grown, was] = [chunk.len() as u64, first as u64];
-        let lied = with_index(&swollen, |index| {
+        let changed = with_index(&enlarged, |index| {
             index[1] = grown;
             for entry in index.chunks_mut(2).skip(1).filter(|entry| entry[0] != u64::MAX) {
                 entry[0] = entry[0] + grown - was;
             }
         });
-        says(lied, "chunk 0");
+        says(changed, "chunk 0");
     }
 }
 
 proptest! {
-    /// Whatever stands where chunks and index were, under a right checksum: values or an error, and nothing else.
+    /// Random chunks and index entries with a valid checksum give values or an error.
     #[test]
-    fn no_bytes_make_the_reader_panic(
+    fn random_bytes_do_not_panic(
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..12),
         entries in prop::collection::vec((any::<prop::sample::Index>(), any::<u64>()), 0..4),
         near in any::<bool>(),
@@ -269,10 +277,11 @@ proptest! {
 }
 
 #[test]
-fn a_slide_is_halved_shard_by_shard_and_then_from_its_files() {
+fn a_pyramid_can_be_written_shard_by_shard() {
     let tiling = Tiling { chunk: 8, shard: 16, planes: 1 };
-    let form = Form { kind: Kind::U8, channels: None, planes: None, height: 83, width: 101, tiling, levels: 5 };
-    let pyramid = Pyramid::new(&form).unwrap();
+    let shape =
+        PyramidShape { kind: DataType::U8, channels: None, planes: None, height: 83, width: 101, tiling, levels: 5 };
+    let pyramid = Pyramid::new(&shape).unwrap();
     let levels = pyramid.levels();
     let all = values(&levels[0], |v| v as u8);
     let mut files: Vec<std::collections::BTreeMap<Shard, Vec<u8>>> = vec![Default::default(); levels.len()];
@@ -305,8 +314,8 @@ fn a_slide_is_halved_shard_by_shard_and_then_from_its_files() {
             files[level].insert(shard, shard_bytes(&levels[level], shard, &half).unwrap());
         }
     }
-    // The same as the whole image halved at once.
-    let (mut whole, mut width) = (all, form.width);
+    // The levels equal the complete image, halved at once.
+    let (mut whole, mut width) = (all, shape.width);
     for (level, array) in levels.iter().enumerate() {
         for shard in array.shards() {
             let mut reader = ShardReader::open(array, shard, Cursor::new(&files[level][&shard])).unwrap();
@@ -317,15 +326,16 @@ fn a_slide_is_halved_shard_by_shard_and_then_from_its_files() {
 }
 
 #[test]
-fn documents_are_groups_and_arrays_for_zarrs() {
+fn zarrs_reads_the_documents() {
     let channel =
         |label: &str| Channel { label: label.to_owned(), color: [255; 3], range: [0.0, 255.0], window: [0.0, 255.0] };
     let tiling = Tiling { chunk: 16, shard: 64, planes: 1 };
-    let form = Form { kind: Kind::U8, channels: Some(3), planes: None, height: 50, width: 60, tiling, levels: 2 };
+    let shape =
+        PyramidShape { kind: DataType::U8, channels: Some(3), planes: None, height: 50, width: 60, tiling, levels: 2 };
     let image = Image {
         name: "one".to_owned(),
-        pyramid: Pyramid::new(&form).unwrap(),
-        space: Space { pixel_um: 0.25, step_um: 1.0, first_um: 0.0 },
+        pyramid: Pyramid::new(&shape).unwrap(),
+        coordinates: Coordinates { pixel_um: 0.25, step_um: 1.0, first_um: 0.0 },
         channels: ["red", "green", "blue"].map(channel).to_vec(),
         plane: 0,
         labels: Vec::new(),

@@ -96,7 +96,7 @@ macro_rules! kinds {
             /// kind as class.
             #[derive(PartialOrd, Ord, Hash, Serialize, Deserialize)]
             #[serde(rename_all = "kebab-case")]
-            pub enum Kind {
+            pub enum ObjectKind {
                 /// Epithelial cells: cytoplasm and nucleus.
                 Cell = "cell",
                 $($(#[$doc])* $Kind = $name,)*
@@ -112,7 +112,7 @@ macro_rules! kinds {
             $($(#[$doc])* $Kind($Object),)*
         }
 
-        impl Kind {
+        impl ObjectKind {
             /// Whether all objects of the kind share one row and one mask of the ground truth: a layer of uncounted
             /// objects.
             #[must_use]
@@ -129,10 +129,10 @@ macro_rules! kinds {
         impl Body {
             /// Returns the kind of the object.
             #[must_use]
-            pub fn kind(&self) -> Kind {
+            pub fn kind(&self) -> ObjectKind {
                 match self {
-                    Self::Cell(_) => Kind::Cell,
-                    $(Self::$Kind(_) => Kind::$Kind,)*
+                    Self::Cell(_) => ObjectKind::Cell,
+                    $(Self::$Kind(_) => ObjectKind::$Kind,)*
                 }
             }
 
@@ -172,10 +172,10 @@ macro_rules! kinds {
             }
 
             /// Returns the abundance of a kind; none of cells.
-            pub(crate) fn abundance(&self, kind: Kind) -> Option<&Abundance> {
+            pub(crate) fn abundance(&self, kind: ObjectKind) -> Option<&Abundance> {
                 match kind {
-                    Kind::Cell => None,
-                    $(Kind::$Kind => Some(&self.$field.$count),)*
+                    ObjectKind::Cell => None,
+                    $(ObjectKind::$Kind => Some(&self.$field.$count),)*
                 }
             }
 
@@ -186,10 +186,10 @@ macro_rules! kinds {
 
             /// Returns the abundance of a kind; none of cells.
             #[cfg(test)]
-            fn count_mut(&mut self, kind: Kind) -> Option<&mut Abundance> {
+            fn count_mut(&mut self, kind: ObjectKind) -> Option<&mut Abundance> {
                 match kind {
-                    Kind::Cell => None,
-                    $(Kind::$Kind => Some(&mut self.$field.$count),)*
+                    ObjectKind::Cell => None,
+                    $(ObjectKind::$Kind => Some(&mut self.$field.$count),)*
                 }
             }
 
@@ -197,7 +197,7 @@ macro_rules! kinds {
             pub(crate) fn draw(&self, field: &Field<'_>) -> Vec<PlacedObject<Body>> {
                 let mut objects = Vec::new();
                 $({
-                    let kind = Kind::$Kind;
+                    let kind = ObjectKind::$Kind;
                     let in_margin = self.$field.$count.is_density();
                     let mut placer = KindPlacer::new(field, kind.name(), stringify!($field), kind.is_on_glass(), in_margin);
                     self.$field.draw(&mut placer);

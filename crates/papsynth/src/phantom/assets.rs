@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use cloth_verlet::{Cloth, ClothParams};
 use fsd_shape::{Descriptors, ShapeModel};
 use quilt_texture::QuiltParams;
-use voronoi_cytoskeleton::{River, Skeleton, SkeletonParams, Torus};
+use voronoi_cytoskeleton::{DescentPath, Skeleton, SkeletonParams, Torus};
 
 use super::chromatin::DonorSet;
 use super::noise_fields::NoiseFieldGenerator;
@@ -84,7 +84,7 @@ impl Cytoskeletons {
     }
 
     /// Returns the cytoskeleton lines of one cell inside its outline.
-    pub(crate) fn grow(&self, outline: &[Point], rng: &mut Stream) -> Result<Vec<River>, Cause> {
+    pub(crate) fn grow(&self, outline: &[Point], rng: &mut Stream) -> Result<Vec<DescentPath>, Cause> {
         let number = random::below(TORI, rng);
         let torus = self.tori[number].get_or_init(|| {
             let mut torus_rng = Key { seed: 0, index: 0 }.stream("studio", number as u64, "torus");

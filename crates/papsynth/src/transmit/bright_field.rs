@@ -154,7 +154,7 @@ impl BrightFieldPath {
         let (FocusAt::Stage(plane_um), [.., light]) = (focus, &group.lights[..]) else { return 0.0 };
         let stage_um = specimen.scene.seen_at_um(plane_um, specimen.scene.objects[index].depth_um);
         let microscope = light.imager.microscope();
-        // An even disc of radius r has a standard deviation of r/2 along each axis.
+        // A uniform disc of radius r has a standard deviation of r/2 along each axis.
         microscope.cone_radius_um(specimen.scene.objects[index].depth_um, stage_um)
             / (2.0 * specimen.scene.view.pixel_um)
     }

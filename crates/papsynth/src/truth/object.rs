@@ -3,7 +3,7 @@
 use super::mask::Mask;
 use super::part::{Group, Part};
 use super::traits::Traits;
-use crate::debris::Kind;
+use crate::debris::ObjectKind;
 use crate::scene::cell::Tint;
 
 /// Ground truth of one object, or of one part of a cell.
@@ -14,7 +14,7 @@ pub struct ObjectTruth {
     /// Part of the object that this row describes.
     pub part: Part,
     /// Kind of object.
-    pub kind: Kind,
+    pub kind: ObjectKind,
     /// Class: for cells the class of the model, for other objects the name of their kind.
     pub class: String,
     /// Bethesda category of the class ("NILM", "HSIL", …); empty if it has none.
@@ -75,7 +75,7 @@ pub struct Truth {
     /// Rows of the image.
     pub height: usize,
     /// One row for every object and every part of a cell, sorted by id and part. Objects without a pixel in the image
-    /// are omitted; all objects of a [layer](Kind::is_layer) share one row.
+    /// are omitted; all objects of a [layer](ObjectKind::is_layer) share one row.
     pub objects: Vec<ObjectTruth>,
 }
 

@@ -5,7 +5,7 @@
 use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::{Clusters, Layout, Number, Preset, Recipe};
-use papsynth::scene::Kind;
+use papsynth::scene::ObjectKind;
 use papsynth::truth::{Group, Part};
 use papsynth::{Engine, Error, Frame, Inputs, Threads};
 
@@ -76,14 +76,21 @@ fn adding_a_speckle_changes_no_other_object() {
             .truth
             .objects
             .iter()
-            .filter(|o| o.kind != Kind::Speckle)
+            .filter(|o| o.kind != ObjectKind::Speckle)
             // Ids depend on the number of objects of other kinds.
             .map(|o| (o.kind, o.part, o.amodal.clone()))
             .collect::<Vec<_>>()
     };
     assert_eq!(others(&few), others(&more));
     let scene = |frame: &Frame| {
-        frame.finished.scene.objects.iter().filter(|o| o.body.kind() == Kind::Speckle).cloned().collect::<Vec<_>>()
+        frame
+            .finished
+            .scene
+            .objects
+            .iter()
+            .filter(|o| o.body.kind() == ObjectKind::Speckle)
+            .cloned()
+            .collect::<Vec<_>>()
     };
     assert_eq!(scene(&few)[..], scene(&more)[..5]);
 }

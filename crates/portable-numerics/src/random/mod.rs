@@ -6,7 +6,7 @@
 //! |---|---|---|---|
 //! | [`normal`], [`Normals`] | `f64`, any size | a generator | scalar draws |
 //! | [`Ziggurat`] | `f32`, any size | a generator | white noise: many draws in order, nearly all without a logarithm |
-//! | [`normals_of_words`] | `f32`, up to 6.76 | two random words for each pair | rows of pixels whose words are a function of position; branch-free, so it vectorises |
+//! | [`normals_of_words`] | `f32`, up to 6.76 | two words for each pair | rows of pixels; vectorises |
 
 mod draws;
 mod splitmix;

@@ -1,3 +1,3 @@
 //! Integration tests, linked as one program.
 
-mod laws;
+mod synthesis;

@@ -13,10 +13,10 @@ fn diagrams() -> Vec<Diagram> {
         .iter()
         .flat_map(|window| [1, 2, 3, 4, 7, 50, 300].map(|count| random(window, count, count as u64)))
         .collect();
-    // Every circumcircle passes through four sites, and many edges end in the border at right angles.
+    // Every circumcircle contains four sites, and many edges are perpendicular to the border.
     let (sites, window) = lattice(9, 7);
     diagrams.push(Diagram::new(&sites, &window).unwrap());
-    // Sites on one line, and close to the border.
+    // Collinear sites, and sites on the border.
     let window = Window::rectangle([0.0, 0.0], [10.0, 10.0]).unwrap();
     let line: Vec<Point> = (0..10).map(|i| [f64::from(i) + 0.25, 5.0]).collect();
     diagrams.extend([line, rim()].map(|sites| Diagram::new(&sites, &window).unwrap()));
@@ -24,7 +24,7 @@ fn diagrams() -> Vec<Diagram> {
 }
 
 #[test]
-fn edges_and_cells_tell_the_same() {
+fn edges_and_cells_are_consistent() {
     for diagram in diagrams() {
         let mut sides: BTreeMap<[usize; 2], usize> = BTreeMap::new();
         for cell in 0..diagram.sites().len() {
@@ -41,15 +41,15 @@ fn edges_and_cells_tell_the_same() {
             uses += 1 + usize::from(edge.neighbour.is_some());
         }
         assert_eq!(uses, sides.len());
-        // Euler.
+        // Euler's formula.
         let (v, e, f) = (diagram.vertices().len(), diagram.edges().len(), diagram.sites().len());
         assert_eq!(v + f, e + 1, "{v} vertices, {e} edges, {f} cells");
     }
 }
 
 #[test]
-fn agrees_with_the_clipping_of_every_bisector() {
-    // The ten-line oracle: the window, cut by the bisector against every other site.
+fn cells_agree_with_clipping_by_every_bisector() {
+    // Reference implementation: the window clipped by the bisectors with all other sites.
     for diagram in diagrams() {
         for (cell, &site) in diagram.sites().iter().enumerate() {
             let mut polygon = diagram.window().corners().to_vec();
@@ -82,7 +82,7 @@ fn agrees_with_the_clipping_of_every_bisector() {
 }
 
 #[test]
-fn relaxing_never_raises_the_energy_and_evens_the_cells() {
+fn relaxation_reduces_the_energy_and_the_variation_of_areas() {
     for (seed, window) in windows().iter().enumerate() {
         let mut diagram = random(window, 200, seed as u64);
         let spread = |diagram: &Diagram| deviation(&(0..200).map(|cell| diagram.area(cell)).collect::<Vec<_>>());
@@ -99,7 +99,7 @@ fn relaxing_never_raises_the_energy_and_evens_the_cells() {
 }
 
 #[test]
-fn a_centroidal_diagram_stays() {
+fn a_centroidal_diagram_does_not_change() {
     let (sites, window) = lattice(9, 7);
     let mut diagram = Diagram::new(&sites, &window).unwrap();
     diagram.relax();
@@ -107,7 +107,7 @@ fn a_centroidal_diagram_stays() {
 }
 
 #[test]
-fn energy_is_the_squared_distance_to_the_nearest_site() {
+fn energy_is_the_integral_of_the_squared_distance() {
     let window = Window::rectangle([0.0, 0.0], [1.0, 1.0]).unwrap();
     let single = Diagram::new(&[[0.5, 0.5]], &window).unwrap();
     assert!((single.energy() - 1.0 / 6.0).abs() < 1e-15);
@@ -115,7 +115,7 @@ fn energy_is_the_squared_distance_to_the_nearest_site() {
 }
 
 #[test]
-fn border_vertices_lie_on_the_border() {
+fn border_vertices_are_on_the_border() {
     for diagram in diagrams() {
         let window = diagram.window();
         for (vertex, &point) in diagram.vertices().iter().enumerate() {
@@ -131,14 +131,14 @@ fn border_vertices_lie_on_the_border() {
 }
 
 #[test]
-fn refused_sites_say_why() {
+fn invalid_sites_are_reported() {
     let window = Window::rectangle([0.0, 0.0], [10.0, 10.0]).unwrap();
     let message = |sites: &[Point]| Diagram::new(sites, &window).unwrap_err().to_string();
     assert!(message(&[]).starts_with("0 sites"));
-    assert!(message(&[[1.0, 1.0], [2.0, 2.0], [1.0, 1.0]]).starts_with("3 sites lie in 2"));
-    assert!(message(&[[1.0, 1.0], [f64::NAN, 2.0]]).starts_with("site 1 is [NaN, 2]"));
-    assert!(message(&[[1.0, 1.0], [2.0, f64::NEG_INFINITY]]).starts_with("site 1 is"));
-    assert!(message(&[[1.0, 1.0], [11.0, 2.0]]).starts_with("site 1 at [11, 2] lies outside"));
-    // Too small for the triangulation, and zero for every purpose.
+    assert!(message(&[[1.0, 1.0], [2.0, 2.0], [1.0, 1.0]]).starts_with("3 sites at 2"));
+    assert!(message(&[[1.0, 1.0], [f64::NAN, 2.0]]).starts_with("site 1 = [NaN, 2]"));
+    assert!(message(&[[1.0, 1.0], [2.0, f64::NEG_INFINITY]]).starts_with("site 1 ="));
+    assert!(message(&[[1.0, 1.0], [11.0, 2.0]]).starts_with("site 1 at [11, 2] is outside"));
+    // Replaced by 0, because it is too small for the triangulation.
     assert!(Diagram::new(&[[1e-300, 0.0], [2.0, 2.0]], &window).is_ok());
 }

@@ -1,7 +1,7 @@
 use super::*;
 use crate::testing::{draws, lattice, rim, windows};
 
-/// The fast pass is the slow one, within a share of the size of a cell.
+/// Asserts that the fast pass agrees with the diagram, relative to the size of a cell.
 fn agree(sites: &[Point], window: &Window, tolerance: f64) {
     let mut slow = Diagram::new(sites, window).unwrap();
     slow.relax();
@@ -15,7 +15,7 @@ fn agree(sites: &[Point], window: &Window, tolerance: f64) {
 }
 
 #[test]
-fn agrees_with_the_diagram() {
+fn relaxed_sites_agree_with_the_diagram() {
     for window in windows() {
         for count in [1, 2, 3, 7, 40, 300, 1000] {
             for seed in 0..20 {
@@ -26,7 +26,7 @@ fn agrees_with_the_diagram() {
 }
 
 #[test]
-fn a_lattice_stays() {
+fn a_lattice_does_not_change() {
     let (sites, window) = lattice(20, 15);
     for (before, after) in sites.iter().zip(relaxed(&sites, &window, 3).unwrap()) {
         assert!(length(sub(after, *before)) < 1e-12);
@@ -34,7 +34,7 @@ fn a_lattice_stays() {
 }
 
 #[test]
-fn sites_on_the_border_and_nearly_in_one_place() {
+fn sites_on_the_border_and_nearly_coincident_sites() {
     let window = Window::rectangle([0.0, 0.0], [10.0, 10.0]).unwrap();
     agree(&rim(), &window, 1e-7);
     for (seed, apart) in [1e-3, 1e-6, 1e-9].into_iter().enumerate() {
@@ -55,7 +55,7 @@ fn sites_on_the_border_and_nearly_in_one_place() {
 }
 
 #[test]
-fn a_cell_of_many_sides_is_left_to_the_triangulation() {
+fn cells_of_many_sides_need_the_triangulation() {
     let corner = |k: u32| core::f64::consts::TAU * f64::from(k) / 100.0;
     let corners: Vec<Point> = (0..100).map(|k| [libm::cos(corner(k)), libm::sin(corner(k))]).collect();
     let window = Window::convex(&corners).unwrap();

@@ -2,7 +2,7 @@ use super::*;
 use crate::Window;
 use crate::testing::draws;
 
-/// A star with notches: concave, and with level and upright sides.
+/// Returns a concave star.
 fn star(count: u32) -> Vec<Point> {
     (0..count)
         .map(|k| {
@@ -28,14 +28,14 @@ fn oracle(points: &[Point], p: Point) -> f64 {
 }
 
 #[test]
-fn agrees_with_a_look_at_every_segment() {
+fn heights_agree_with_brute_force() {
     let square = vec![[40.0, 40.0], [140.0, 40.0], [140.0, 40.0], [140.0, 120.0], [40.0, 120.0]];
     let outlines = [star(3), star(7), star(8), star(9), star(64), star(65), star(421), square];
     let around = Window::rectangle([0.0, 0.0], [200.0, 160.0]).unwrap();
     for points in outlines {
         let outline = Outline::new(&points).unwrap();
         let random = draws(&around, 500, points.len() as u64);
-        // Random points, and points level with corners.
+        // Random points, and points at the same y as corners.
         let level: Vec<Point> = points.iter().map(|p| [p[0] - 7.25, p[1]]).collect();
         for point in random.into_iter().chain(level) {
             let (found, expected) = (outline.height(point), oracle(&points, point));
@@ -45,7 +45,7 @@ fn agrees_with_a_look_at_every_segment() {
 }
 
 #[test]
-fn refused_outlines_say_why() {
+fn invalid_outlines_are_reported() {
     let message = |points: &[Point]| Outline::new(points).unwrap_err().to_string();
     assert!(message(&[]).starts_with("the outline of 0 points"));
     assert!(message(&[[0.0, 0.0], [1.0, 0.0]]).starts_with("the outline of 2 points"));

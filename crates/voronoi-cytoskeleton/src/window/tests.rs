@@ -2,7 +2,7 @@ use super::*;
 use crate::testing::{draws, pentagon};
 
 #[test]
-fn either_order_of_corners_gives_the_same_window() {
+fn both_orientations_give_the_same_window() {
     let square = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]];
     let mut reversed = square;
     reversed.reverse();
@@ -16,7 +16,7 @@ fn either_order_of_corners_gives_the_same_window() {
 }
 
 #[test]
-fn repeated_and_straight_corners_are_welcome() {
+fn repeated_and_collinear_corners_are_accepted() {
     let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0], [0.0, 0.0]];
     let window = Window::convex(&corners).unwrap();
     assert_eq!((window.corners().len(), window.area()), (5, 2.0));
@@ -40,7 +40,7 @@ fn draws_are_uniform() {
 }
 
 #[test]
-fn clip_keeps_what_lies_inside() {
+fn clip_returns_the_part_inside() {
     let window = pentagon();
     for i in 0..200 {
         let angle = f64::from(i) * 0.1;
@@ -58,22 +58,22 @@ fn clip_keeps_what_lies_inside() {
 }
 
 #[test]
-fn reach_grows_along_the_border() {
+fn arc_length_increases_along_the_border() {
     let window = pentagon();
     let mut last = -1.0;
     for side in 0..5 {
         for step in 0..10 {
             let (from, to) = (window.corners[side], window.corners[(side + 1) % 5]);
             let point = along(from, sub(to, from), (f64::from(step) + 0.5) / 10.0);
-            let reach = window.reach_of(point);
-            assert!(reach > last && reach < window.reach[5]);
-            last = reach;
+            let arc_length = window.arc_length_of(point);
+            assert!(arc_length > last && arc_length < window.arc_length[5]);
+            last = arc_length;
         }
     }
 }
 
 #[test]
-fn refused_windows_say_why() {
+fn invalid_windows_are_reported() {
     let message = |corners: &[Point]| Window::convex(corners).unwrap_err().to_string();
     assert!(message(&[[0.0, 0.0], [1.0, f64::NAN], [1.0, 1.0]]).starts_with("window corner 1"));
     assert!(message(&[[0.0, 0.0], [1e10, 0.0], [1.0, 1.0]]).starts_with("window corner 1"));

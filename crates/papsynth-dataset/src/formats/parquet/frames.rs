@@ -201,8 +201,8 @@ pub(crate) fn card(classes: &[String], splits: &[Split]) -> Result<(String, Vec<
 pub(crate) fn images(path: &Path, image: &str) -> Result<Vec<Vec<u8>>, Error> {
     let named = image.strip_suffix(FILE).map(|index| (index, "image"));
     let named = named.or(image.strip_suffix(PLANES).map(|index| (index, "planes")));
-    let wanted = named.and_then(|(index, column)| Some((index.parse().ok()?, column)));
-    let found = match wanted {
+    let requested = named.and_then(|(index, column)| Some((index.parse().ok()?, column)));
+    let found = match requested {
         Some((index, column)) => find(path, index, column).map_err(failed("read", path))?,
         None => None,
     };

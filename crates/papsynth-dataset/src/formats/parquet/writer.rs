@@ -151,8 +151,8 @@ impl Leaf {
     }
 }
 
-/// Shreds a value into its leaf columns, as Dremel does: Melnik et al., VLDB 3 (2010) 330-339. Returns the approximate number of
-/// bytes in memory.
+/// Shreds a value into its leaf columns, as Dremel does: Melnik et al., VLDB 3 (2010) 330-339. Returns the approximate
+/// number of bytes in memory.
 fn shred(kind: Kind, nullable: bool, value: Cell, at: Level, leaves: &mut [Leaf]) -> usize {
     let lack = |level, leaves: &mut [Leaf]| leaves.iter_mut().map(|leaf| leaf.push(Cell::Nothing, level)).sum();
     let there = Level { definition: at.definition + i16::from(nullable), ..at };

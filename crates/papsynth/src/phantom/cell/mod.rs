@@ -62,8 +62,8 @@ fn outline(cell: &CellContext<'_>, class: &ClassAssets, centre: Point) -> Result
     let mut rng = cell.stream("outline");
     let radius_px = cell.body.radius_um / cell.pixel_um();
     let formed = class.cytoplasm(radius_px, &mut rng)?;
-    let posed = formed.rotated(cell.object.rotation_deg.to_radians());
-    let outline = posed.outline(POINTS);
+    let rotated = formed.rotated(cell.object.rotation_deg.to_radians());
+    let outline = rotated.outline(POINTS);
     let middle = fsd_shape::centroid(&outline);
     let outline: Vec<Point> =
         outline.iter().map(|p| [p[0] - middle[0] + centre[0], p[1] - middle[1] + centre[1]]).collect();
@@ -146,7 +146,8 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
             for crease in &plan.creases {
                 sheet.fold(crease)?;
             }
-            let view = PixelGrid { origin: [absorbance.origin[0] as f64, absorbance.origin[1] as f64], pixel_size: 1.0 };
+            let view =
+                PixelGrid { origin: [absorbance.origin[0] as f64, absorbance.origin[1] as f64], pixel_size: 1.0 };
             sheet.thickness_into(&mut absorbance.values, coverage.width, &view, |radius| {
                 interpolate(profile, 1.0 - radius)
             });

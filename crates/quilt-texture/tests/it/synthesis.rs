@@ -1,4 +1,4 @@
-//! What every synthesised texture obeys.
+//! Properties of synthesised textures.
 
 use quilt_texture::{Acceptance, CentreBias, Error, Origin, QuiltParams, Quilter, Rng, Seam, Search, Source, Texture};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
@@ -22,8 +22,8 @@ fn noise(count: usize, rng: &mut Generator) -> Vec<f32> {
     (0..count).map(|_| (rng.next_u32() >> 8) as f32 / (1 << 24) as f32).collect()
 }
 
-/// A periodic field of variance 1 with the spectrum (1 + (2π f l)² / 2)^-2, a Matérn field of
-/// ν = 1: its autocorrelation at one to six pixels is close to that of chromatin for l = 2.
+/// Returns a periodic Matérn field of variance 1 and ν = 1, with the spectrum (1 + (2π f l)² / 2)^-2. For l = 2, its
+/// autocorrelation at one to six pixels is similar to that of chromatin.
 fn matern(side: usize, length_px: f64, rng: &mut Generator) -> Vec<f32> {
     let mut columns: Vec<Complex64> = (0..side * side)
         .map(|_| Complex64::from((0..12).map(|_| noise(1, rng)[0] as f64).sum::<f64>() - 6.0))
@@ -55,7 +55,7 @@ fn matern(side: usize, length_px: f64, rng: &mut Generator) -> Vec<f32> {
     pixels
 }
 
-/// Mean product of pixels under the mask, `lag` px apart across and down, for lags 0 to 6.
+/// Returns the mean product of pixels under the mask at lags of 0 to 6 px along x and y.
 fn autocovariance(pixels: &[f32], mask: &[f32], width: usize) -> [f64; 7] {
     let mut result = [0.0; 7];
     for (lag, result) in result.iter_mut().enumerate() {
@@ -91,7 +91,7 @@ fn every_acceptance() -> [Acceptance; 3] {
 }
 
 #[test]
-fn every_pixel_of_a_sharp_cut_is_a_pixel_of_a_source() {
+fn pixels_of_a_sharp_cut_are_pixels_of_a_source() {
     let mut rng = rng();
     let (mask, other) = (disc(40), disc(31));
     let images = [noise(1600, &mut rng), noise(961, &mut rng)];
@@ -102,15 +102,15 @@ fn every_pixel_of_a_sharp_cut_is_a_pixel_of_a_source() {
             let params = QuiltParams { acceptance, centre_bias, ..QuiltParams::default() };
             let texture = synthesise(&sources, &params, &target, 57, &mut rng);
             let mut used = [0, 0];
-            for (i, &wanted) in target.iter().enumerate() {
+            for (i, &expected) in target.iter().enumerate() {
                 match texture.origins[i] {
                     Some(Origin { source, pixel }) => {
-                        assert!(wanted > 0.0);
+                        assert!(expected > 0.0);
                         assert_eq!(texture.pixels[i], images[source][pixel]);
                         assert!([&mask, &other][source][pixel] >= 0.5);
                         used[source] += 1;
                     }
-                    None => assert_eq!((wanted, texture.pixels[i]), (0.0, 0.0)),
+                    None => assert_eq!((expected, texture.pixels[i]), (0.0, 0.0)),
                 }
             }
             assert!(used.iter().all(|&n| n > 50), "{used:?}");
@@ -119,7 +119,7 @@ fn every_pixel_of_a_sharp_cut_is_a_pixel_of_a_source() {
 }
 
 #[test]
-fn weights_sum_to_one() {
+fn seam_weights_sum_to_one() {
     let mut rng = rng();
     let source = Source::new(&[0.7; 400], &[1.0; 400], 20).unwrap();
     let target = disc(33);
@@ -127,15 +127,15 @@ fn weights_sum_to_one() {
         for acceptance in every_acceptance() {
             let params = QuiltParams { seam, acceptance, ..QuiltParams::default() };
             let texture = synthesise(core::slice::from_ref(&source), &params, &target, 33, &mut rng);
-            for (&v, &wanted) in texture.pixels.iter().zip(&target) {
-                assert_eq!(v, 0.7 * wanted);
+            for (&v, &expected) in texture.pixels.iter().zip(&target) {
+                assert_eq!(v, 0.7 * expected);
             }
         }
     }
 }
 
 #[test]
-fn blends_stay_within_the_sources() {
+fn blended_pixels_are_in_the_range_of_the_sources() {
     let mut rng = rng();
     let source = Source::new(&noise(900, &mut rng), &disc(30), 30).unwrap();
     for seam in every_seam() {
@@ -147,7 +147,7 @@ fn blends_stay_within_the_sources() {
 }
 
 #[test]
-fn a_regular_pattern_is_continued_without_a_break() {
+fn a_regular_pattern_continues_across_seams() {
     let mut rng = rng();
     let pattern = |x: usize, y: usize| ((x + 2 * y) % 5) as f32;
     let image: Vec<f32> = (0..900).map(|i| pattern(i % 30, i / 30)).collect();
@@ -173,7 +173,7 @@ fn all_searches_find_the_same_best_candidate() {
     let texture = |search, patch_px| {
         let params = QuiltParams {
             patch_px,
-            // Only the best: rounding cannot tip a choice between equals.
+            // Only the best candidate, so that rounding errors have no effect.
             acceptance: Acceptance::Near { factor: 1.0, floor: 0.0 },
             search,
             ..QuiltParams::default()
@@ -189,16 +189,16 @@ fn all_searches_find_the_same_best_candidate() {
 }
 
 #[test]
-fn variance_and_autocorrelation_survive() {
+fn variance_and_autocorrelation_are_preserved() {
     const DRAWS: usize = 120;
     let mut rng = rng();
-    // Three nuclei of 40 px, as the paper has it; one large texture.
+    // Three nuclei of 40 px, as in the paper; one large texture.
     let nuclei = QuiltParams::default();
     let large = QuiltParams { patch_px: 20, overlap_px: 6, centre_bias: CentreBias::Off, ..QuiltParams::default() };
     for (params, side, mask, count, draws) in
         [(nuclei, 40, disc(40), 3, DRAWS), (large, 96, vec![1.0; 96 * 96], 1, DRAWS / 4)]
     {
-        let (mut real, mut made) = ([0.0; 7], [0.0; 7]);
+        let (mut real, mut synthesised) = ([0.0; 7], [0.0; 7]);
         for _ in 0..draws {
             let images: Vec<_> = (0..count).map(|_| matern(side, 2.0, &mut rng)).collect();
             let sources: Vec<_> = images.iter().map(|i| Source::new(i, &mask, side).unwrap()).collect();
@@ -208,18 +208,18 @@ fn variance_and_autocorrelation_survive() {
                 sum.iter_mut().zip(covariance).for_each(|(s, c)| *s += weight * c);
             };
             images.iter().for_each(|image| add(&mut real, image, 1.0 / count as f64));
-            add(&mut made, &texture.pixels, 1.0);
+            add(&mut synthesised, &texture.pixels, 1.0);
         }
-        let ratio = made[0] / real[0];
+        let ratio = synthesised[0] / real[0];
         assert!((0.9..1.05).contains(&ratio), "variance ratio {ratio}");
-        let squares = (1..7).map(|lag| made[lag] / made[0] - real[lag] / real[0]).map(|d| d * d);
+        let squares = (1..7).map(|lag| synthesised[lag] / synthesised[0] - real[lag] / real[0]).map(|d| d * d);
         let rmse = (squares.sum::<f64>() / 6.0).sqrt();
         assert!(rmse <= 0.03, "autocorrelation off by {rmse}");
     }
 }
 
 #[test]
-fn centres_come_from_centres() {
+fn central_patches_come_from_the_centres_of_sources() {
     let target = disc(40);
     let depth = |i: usize| {
         let offset = |i: usize| (2 * i + 1) as f64 / 40.0 - 1.0;
@@ -252,7 +252,7 @@ fn centres_come_from_centres() {
 }
 
 #[test]
-fn a_lower_threshold_or_a_cut_makes_smaller_steps() {
+fn a_lower_threshold_or_feathering_reduces_differences_at_seams() {
     let mask = disc(40);
     let step = |d_max, seam| {
         let mut rng = rng();
@@ -285,7 +285,7 @@ fn a_lower_threshold_or_a_cut_makes_smaller_steps() {
 }
 
 #[test]
-fn same_seed_same_texture() {
+fn the_same_seed_gives_the_same_texture() {
     let sources = [Source::new(&noise(1600, &mut rng()), &disc(40), 40).unwrap()];
     for params in [QuiltParams::default(), QuiltParams::paper()] {
         let draw = |rng: &mut Generator| synthesise(&sources, &params, &disc(40), 40, rng);
@@ -296,7 +296,7 @@ fn same_seed_same_texture() {
 }
 
 #[test]
-fn odd_targets_are_filled() {
+fn targets_of_any_shape_are_filled() {
     let mut rng = rng();
     let sources = [Source::new(&noise(400, &mut rng), &disc(20), 20).unwrap()];
     let speckled: Vec<f32> = noise(50 * 41, &mut rng).iter().map(|v| if *v < 0.02 { 0.01 } else { 0.0 }).collect();
@@ -312,15 +312,15 @@ fn odd_targets_are_filled() {
         for params in [QuiltParams::default(), QuiltParams::paper()] {
             let texture = synthesise(&sources, &params, &target, width, &mut rng);
             assert_eq!((texture.pixels.len(), texture.width), (target.len(), width));
-            for (origin, &wanted) in texture.origins.iter().zip(&target) {
-                assert_eq!(origin.is_some(), wanted > 0.0);
+            for (origin, &expected) in texture.origins.iter().zip(&target) {
+                assert_eq!(origin.is_some(), expected > 0.0);
             }
         }
     }
 }
 
 #[test]
-fn sources_must_have_room() {
+fn too_small_sources_are_rejected() {
     let params = QuiltParams::default();
     assert_eq!(Quilter::new(&[], &params).unwrap_err(), Error::NoSource);
     let (large, small) =
@@ -330,8 +330,8 @@ fn sources_must_have_room() {
 }
 
 #[test]
-#[should_panic(expected = "whole rows of 7 pixels")]
-fn a_wrong_length_is_named() {
+#[should_panic(expected = "a multiple of the width 7")]
+fn a_partial_row_is_rejected() {
     let source = Source::new(&[1.0; 400], &[1.0; 400], 20).unwrap();
     let _ = synthesise(&[source], &QuiltParams::default(), &[1.0; 50], 7, &mut rng());
 }
