@@ -11,7 +11,7 @@ mod support;
 use image::{Rgb, RgbImage};
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{CellMix, Debris, Layout, Preset, Recipe, is_toml_table};
+use papsynth::recipe::{CellMix, Clusters, Debris, Layout, Number, Preset, Recipe, is_toml_table};
 use papsynth::{Engine, Inputs};
 use serde_json::{Map, Value, json};
 use support::{LINE, Outcome, enlarged, picture, save, write};
@@ -52,7 +52,7 @@ const OF_NOTHING: [(&str, f64); 18] = [
 /// Highest values of what cannot be drawn with higher ones: a patch has to fit into its donors.
 const HIGHEST: [(&str, f64); 1] = [("nucleus.patch_um", 3.5)];
 
-/// Values of what is chosen from a list, by the path.
+/// Values of words, by the path.
 const CHOICES: [(&str, &[&str]); 21] = [
     ("cytoplasm.shape", &["correlated", "independent"]),
     ("cytoplasm.sheet", &["flat", "verlet", "xpbd"]),
@@ -148,7 +148,7 @@ fn base(section: &str) -> Recipe {
         // A share of a field of many square millimetres is seldom in so small a one.
         "debris" => recipe = abundant(&recipe),
         "layout" => {
-            recipe.layout = Preset::Lbc.recipe().layout;
+            recipe.layout = Layout::Clusters(Clusters { count: Number::uniform(5.0, 11.0).into(), ..Clusters::default() });
             recipe.field.pixel_um = 1.3.into();
             recipe.cells.insert("intermediate".to_owned(), CellMix { count: 20.0.into(), ..CellMix::default() });
         }
