@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{Abundance, Clusters, Law, Layout, Number, Preset, Recipe};
+use papsynth::recipe::{Abundance, Clusters, Distribution, Layout, Number, Preset, Recipe};
 use papsynth::truth::Group;
 use papsynth::{Engine, Error, Inputs, Plane, Threads};
 use papsynth_dataset::{Check, Dataset, DatasetInfo, Run, Share};
@@ -72,10 +72,10 @@ pub fn at_density(mut recipe: Recipe, [width, height]: Size) -> Recipe {
 fn middle(number: &Number) -> f64 {
     match number {
         Number::Fixed(value) => *value,
-        Number::Drawn { law, .. } => match law {
-            Law::Uniform(low, high) => (low + high) / 2.0,
-            Law::Normal(middle, _) | Law::LogNormal(middle, _) => *middle,
-            Law::Choice(values) => values.iter().sum::<f64>() / values.len().max(1) as f64,
+        Number::Drawn { distribution, .. } => match distribution {
+            Distribution::Uniform(low, high) => (low + high) / 2.0,
+            Distribution::Normal(middle, _) | Distribution::LogNormal(middle, _) => *middle,
+            Distribution::Choice(values) => values.iter().sum::<f64>() / values.len().max(1) as f64,
         },
     }
 }

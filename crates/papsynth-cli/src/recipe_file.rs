@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use papsynth::model::Model;
-use papsynth::recipe::diagnose::{self, Fault, Schema};
+use papsynth::recipe::diagnose::{self, FieldError, Schema};
 use papsynth::recipe::{Preset, Recipe};
 use toml::{Table, Value};
 
@@ -89,7 +89,7 @@ impl RecipeFile {
     /// What is wrong with one field, at the place where it was written.
     pub(crate) fn complaint(&self, field: &str, message: String) -> Complaint {
         let path = field.split('.').map(str::to_owned).collect();
-        self.sources.place(Fault { path, span: None, message, help: None })
+        self.sources.place(FieldError { path, span: None, message, help: None })
     }
 
     /// What the engine says against the recipe, at the places where its fields were written.
@@ -109,7 +109,7 @@ impl RecipeFile {
         let faults = fields.into_iter().map(|(field, message)| {
             let path: Vec<String> = field.split('.').map(str::to_owned).collect();
             let meaning = schema.at(&path).and_then(|section| section.meaning()).map(|m| format!("the field: {m}"));
-            Fault { path, span: None, message, help: meaning }
+            FieldError { path, span: None, message, help: meaning }
         });
         Failure::from(self.sources.complaint(faults.collect(), heading))
     }
@@ -127,11 +127,11 @@ fn read(path: &Path, what: &str, heading: &str) -> Result<(Recipe, (String, Arc<
 
 impl Sources {
     /// The recipe with every `--set` laid over it, in the order given.
-    fn overlay(&self, base: Recipe) -> Result<Recipe, Vec<Fault>> {
+    fn overlay(&self, base: Recipe) -> Result<Recipe, Vec<FieldError>> {
         if self.sets.is_empty() {
             return Ok(base);
         }
-        let fault = |message: String| vec![Fault { path: Vec::new(), span: None, message, help: None }];
+        let fault = |message: String| vec![FieldError { path: Vec::new(), span: None, message, help: None }];
         let mut table: Table = toml::from_str(&base.to_toml()).map_err(|e| fault(e.to_string()))?;
         for set in &self.sets {
             // Which cells there are is one answer; a field of one class is another.
@@ -142,11 +142,11 @@ impl Sources {
         }
         let text = toml::to_string(&table).map_err(|e| fault(e.to_string()))?;
         // The places found in this text mean nothing to the user; the paths do.
-        diagnose::read(&text).map_err(|faults| faults.into_iter().map(|f| Fault { span: None, ..f }).collect())
+        diagnose::read(&text).map_err(|faults| faults.into_iter().map(|f| FieldError { span: None, ..f }).collect())
     }
 
     /// Faults at the places where the user wrote the fields: the last `--set` that touches one, or the file.
-    fn complaint(&self, faults: Vec<Fault>, heading: &str) -> Complaint {
+    fn complaint(&self, faults: Vec<FieldError>, heading: &str) -> Complaint {
         let more = faults.len().saturating_sub(MOST_FAULTS);
         let mut complaints: Vec<_> = faults.into_iter().take(MOST_FAULTS).map(|f| self.place(f)).collect();
         if more > 0 {
@@ -155,7 +155,7 @@ impl Sources {
         Complaint::all(heading, complaints)
     }
 
-    fn place(&self, fault: Fault) -> Complaint {
+    fn place(&self, fault: FieldError) -> Complaint {
         let complaint = |message: String| match &fault.help {
             Some(help) => Complaint::new(message).help(help),
             None => Complaint::new(message),
@@ -233,7 +233,8 @@ fn merge(base: &mut Table, over: &Table) {
             (Some(Value::Table(inner)), Value::Table(over)) => {
                 let is_law = LAWS.iter().any(|law| over.contains_key(*law));
                 let is_other_kind = over.get("kind").is_some_and(|kind| inner.get("kind") != Some(kind));
-                if is_law || is_other_kind {
+                let is_density = over.contains_key("per_mm2") && !inner.contains_key("per_mm2");
+                if is_law || is_density || is_other_kind {
                     *inner = over.clone();
                 } else {
                     merge(inner, over);
@@ -271,6 +272,13 @@ mod tests {
         let recipe = load(Preset::Lbc, &["layout.kind=uniform", "slide.depth_um={ normal = [4, 0.5] }"]).unwrap();
         assert_eq!(recipe.layout, Layout::Uniform {});
         assert_eq!(recipe.slide.depth_um, Number::normal(4.0, 0.5));
+        for count in ["20", "{ uniform = [1, 4] }", "{ per_mm2 = 120 }", "{ per_mm2 = { uniform = [1, 4] } }"] {
+            let sets = [format!("cells.intermediate.count={count}")];
+            for preset in [Preset::Lbc, Preset::Paper2015] {
+                let recipe = load(preset, &[&sets[0]]).unwrap();
+                assert_eq!(recipe.cells["intermediate"].count.to_string(), count);
+            }
+        }
         let sets = ["layout.kind=band", "layout.width_um=50", "layout.outside=0.1"];
         let band = Layout::Band(papsynth::recipe::Band { width_um: 50.0.into(), outside: 0.1.into() });
         assert_eq!(load(Preset::Lbc, &sets).unwrap().layout, band);
@@ -286,17 +294,17 @@ mod tests {
     fn faults_point_at_the_argument() {
         for (set, expected) in [
             ("field.widht_px=96", "did you mean `width_px`"),
-            ("field.width_px=-3", "field.width_px: -3 is outside 16 to 32768"),
+            ("field.width_px=-3", "field.width_px: -3 is out of range: expected 16 to 32768"),
             ("field.width_px=nan", "field.width_px: NaN"),
-            ("field.width_px=wide", "is a text"),
+            ("field.width_px=wide", "found a string"),
             ("field.width_px", "with `=` between them"),
             ("field.width_px=", "--set"),
             ("=3", "--set"),
             ("field.width_px=[1,", "--set"),
-            ("field=3", "field: 3 is a whole number"),
+            ("field=3", "field: expected a table, found an integer"),
             ("layout.kind=map", "missing field"),
-            ("camera.bits=8.5", "not a whole number"),
-            ("layout.kind=lumps", "layout.kind: `lumps` is not known"),
+            ("camera.bits=8.5", "is not an integer"),
+            ("layout.kind=lumps", "layout.kind: unknown value \"lumps\""),
             ("version=2", "version 2"),
             ("cytoplasm.sheet=xpdb", "did you mean `xpbd`"),
         ] {

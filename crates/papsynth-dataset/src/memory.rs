@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use papsynth::recipe::{Colour, Imaging, Light, Microscope, Mixing, Number, Optics, Recipe};
+use papsynth::recipe::{Colour, Imaging, LightSection, Microscope, Mixing, Number, Optics, Recipe};
 
 use crate::formats::{Format, Layout};
 
@@ -70,9 +70,9 @@ impl Need {
         };
         // Channels of the picture, and lights that are imaged at one time.
         let (channels, lights) = match &recipe.light {
-            Light::Monochrome(_) => (1.0, 1.0),
-            Light::Colour(Colour { mixing: Mixing::PerWavelength, .. }) => (3.0, 1.0),
-            Light::Colour(_) => (3.0, 3.0),
+            LightSection::Monochrome(_) => (1.0, 1.0),
+            LightSection::Colour(Colour { mixing: Mixing::PerWavelength, .. }) => (3.0, 1.0),
+            LightSection::Colour(_) => (3.0, 3.0),
         };
         let grid = samples * samples;
         let mut a_pixel = 10.0 + 25.0 * channels + 4.0 * grid * lights;
@@ -125,7 +125,7 @@ impl Need {
             mix.count = (most(mix.count.number()) * grown).into();
         }
         let of_frame = Self::of(&frame, &Layout::default());
-        let channels = if matches!(recipe.light, Light::Monochrome(_)) { 1.0 } else { 3.0 };
+        let channels = if matches!(recipe.light, LightSection::Monochrome(_)) { 1.0 } else { 3.0 };
         // Grey levels, three labels and layers of a pixel; and once more what is being packed.
         let a_pixel = 2.0 * channels * most(&recipe.focus.planes) + 14.0;
         let shard = f64::from(shard_px) * f64::from(shard_px) * (a_pixel + 4.0 * channels);

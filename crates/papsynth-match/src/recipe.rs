@@ -1,8 +1,8 @@
 //! From values of parameters to a recipe, and back.
 
 use papsynth::recipe::{
-    Abundance, CellMix, Clusters, FocusOutput, Gaussians, Illumination, Law, Layout, Microscope, Number, Optics,
-    Preset, Quadratic, Recipe,
+    Abundance, CellMix, Clusters, Distribution, FocusOutput, Gaussians, Illumination, Layout, Microscope, Number,
+    Optics, Preset, Quadratic, Recipe,
 };
 
 use crate::parameter::{PARAMETERS, Parameter as P, Source, Values};
@@ -168,14 +168,14 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
         r.background.level = cut(normal(level, or_base(P::LevelSpread)), 0.05, 1.1);
     }
     if either(P::BowlAcross, P::BowlDown) {
-        let off_centre = match &r.background.illumination {
-            Illumination::Bowl(Bowl { off_centre, .. }) => off_centre.clone(),
+        let centre_offset = match &r.background.illumination {
+            Illumination::Quadratic(Quadratic { centre_offset, .. }) => centre_offset.clone(),
             Illumination::Border(_) => 0.0.into(),
         };
-        r.background.illumination = Illumination::Bowl(Bowl {
-            x2: cut(normal(or_base(P::BowlAcross), setting.spreads.across), 0.0, 0.45),
-            y2: cut(normal(or_base(P::BowlDown), setting.spreads.down), 0.0, 0.45),
-            off_centre,
+        r.background.illumination = Illumination::Quadratic(Quadratic {
+            falloff_x: cut(normal(or_base(P::BowlAcross), setting.spreads.across), 0.0, 0.45),
+            falloff_y: cut(normal(or_base(P::BowlDown), setting.spreads.down), 0.0, 0.45),
+            centre_offset,
         });
     }
     camera(&mut r, setting, &on, &or_base);
@@ -380,12 +380,12 @@ fn times(number: &Number, factor: f64) -> Number {
     let by = |value: &f64| rounded(value * factor);
     match number {
         Number::Fixed(value) => Number::Fixed(by(value)),
-        Number::Drawn { law, min, max } => Number::Drawn {
-            law: match law {
-                Law::Uniform(a, b) => Law::Uniform(by(a), by(b)),
-                Law::Normal(a, b) => Law::Normal(by(a), by(b)),
-                Law::LogNormal(median, log_sd) => Law::LogNormal(by(median), *log_sd),
-                Law::Choice(values) => Law::Choice(values.iter().map(by).collect()),
+        Number::Drawn { distribution, min, max } => Number::Drawn {
+            distribution: match distribution {
+                Distribution::Uniform(a, b) => Distribution::Uniform(by(a), by(b)),
+                Distribution::Normal(a, b) => Distribution::Normal(by(a), by(b)),
+                Distribution::LogNormal(median, log_sd) => Distribution::LogNormal(by(median), *log_sd),
+                Distribution::Choice(values) => Distribution::Choice(values.iter().map(by).collect()),
             },
             min: if min.is_finite() { by(min) } else { *min },
             max: if max.is_finite() { by(max) } else { *max },
@@ -407,11 +407,11 @@ fn per_mm2(abundance: &Abundance, area: f64, factor: f64) -> Abundance {
 pub(crate) fn centre(number: &Number) -> f64 {
     match number {
         Number::Fixed(value) => *value,
-        Number::Drawn { law, .. } => match law {
-            Law::Uniform(a, b) => 0.5 * (a + b),
-            Law::Normal(mean, _) => *mean,
-            Law::LogNormal(median, _) => *median,
-            Law::Choice(values) => values.iter().sum::<f64>() / values.len().max(1) as f64,
+        Number::Drawn { distribution, .. } => match distribution {
+            Distribution::Uniform(a, b) => 0.5 * (a + b),
+            Distribution::Normal(mean, _) => *mean,
+            Distribution::LogNormal(median, _) => *median,
+            Distribution::Choice(values) => values.iter().sum::<f64>() / values.len().max(1) as f64,
         },
     }
 }
@@ -421,11 +421,11 @@ pub(crate) fn spread(number: &Number) -> f64 {
     let relative = |sd: f64| sd / centre(number).abs().max(1e-9);
     match number {
         Number::Fixed(_) => 0.0,
-        Number::Drawn { law, .. } => match law {
-            Law::Uniform(a, b) => relative((b - a) / 12.0_f64.sqrt()),
-            Law::Normal(_, sd) => relative(*sd),
-            Law::LogNormal(_, log_sd) => *log_sd,
-            Law::Choice(values) => relative(portable_numerics::statistics::deviation(values)),
+        Number::Drawn { distribution, .. } => match distribution {
+            Distribution::Uniform(a, b) => relative((b - a) / 12.0_f64.sqrt()),
+            Distribution::Normal(_, sd) => relative(*sd),
+            Distribution::LogNormal(_, log_sd) => *log_sd,
+            Distribution::Choice(values) => relative(portable_numerics::statistics::deviation(values)),
         },
     }
 }

@@ -1,6 +1,6 @@
 //! What goes wrong, as Python's exceptions.
 
-use papsynth::recipe::diagnose::Fault;
+use papsynth::recipe::diagnose::FieldError;
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
@@ -11,7 +11,7 @@ pub(crate) fn wrong(error: impl std::fmt::Display) -> PyErr {
 }
 
 /// A `papsynth.RecipeError` of these faults, each as its field, what is wrong with it and what would help.
-pub(crate) fn recipe(py: Python<'_>, source: &str, faults: &[Fault]) -> PyErr {
+pub(crate) fn recipe(py: Python<'_>, source: &str, faults: &[FieldError]) -> PyErr {
     let told: Vec<(String, String, Option<String>)> =
         faults.iter().map(|fault| (fault.path.join("."), fault.message.clone(), fault.help.clone())).collect();
     let raise = || -> PyResult<PyErr> {
@@ -25,11 +25,11 @@ pub(crate) fn recipe(py: Python<'_>, source: &str, faults: &[Fault]) -> PyErr {
 pub(crate) fn engine(py: Python<'_>, source: &str, error: &papsynth::Error) -> PyErr {
     let fault = |field: &str, message: String| {
         let path = field.split('.').map(str::to_owned).collect();
-        Fault { path, span: None, message, help: None }
+        FieldError { path, span: None, message, help: None }
     };
     match error {
         papsynth::Error::Recipe(problems) => {
-            let faults: Vec<Fault> = problems.iter().map(|p| fault(&p.field, p.to_string())).collect();
+            let faults: Vec<FieldError> = problems.iter().map(|p| fault(&p.field, p.to_string())).collect();
             recipe(py, source, &faults)
         }
         papsynth::Error::Layout(_) => recipe(py, source, &[fault("layout", error.to_string())]),

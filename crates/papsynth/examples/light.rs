@@ -9,7 +9,7 @@ use image::{GrayImage, RgbImage};
 use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::{
-    Border, Colour, Debris, Illumination, Imaging, Layout, Light, Mixing, PhotonNoise, Preset, Recipe, Rendition,
+    Border, Colour, Debris, Illumination, Imaging, Layout, LightSection, Mixing, PhotonNoise, Preset, Recipe, Rendition,
 };
 use papsynth::scene::{Body, Scene, SceneOptics};
 use papsynth::{Engine, Error, Inputs, Threads};
@@ -123,7 +123,7 @@ fn colour() -> Outcome<RgbImage> {
     for mix in recipe.cells.values_mut() {
         mix.count = 8.0.into();
     }
-    recipe.light = Light::Colour(Colour {
+    recipe.light = LightSection::Colour(Colour {
         lamp_k: 3200.0.into(),
         mixing: Mixing::Spectral,
         chromatic_um: 0.3.into(),

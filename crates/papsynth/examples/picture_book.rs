@@ -8,7 +8,7 @@ use image::{Rgb, RgbImage};
 use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::{
-    CellMix, Colour, Debris, Group, GroupForm, Layout, Light, Mixing, Number, Preset, Recipe, Rendition, TintMix,
+    CellMix, Colour, Debris, Group, GroupForm, Layout, LightSection, Mixing, Number, Preset, Recipe, Rendition, TintMix,
 };
 use papsynth::scene::ObjectKind;
 use papsynth::truth::Part;
@@ -186,7 +186,7 @@ fn debris() -> Vec<Entry> {
 fn draw(entry: &Entry, colour: bool) -> Outcome<RgbImage> {
     let mut recipe = entry.recipe.clone();
     if colour {
-        recipe.light = Light::Colour(Colour {
+        recipe.light = LightSection::Colour(Colour {
             lamp_k: 5500.0.into(),
             mixing: Mixing::Spectral,
             chromatic_um: 0.0.into(),

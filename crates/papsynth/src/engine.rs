@@ -1,4 +1,4 @@
-//! The engine: recipe, model, seed and index in; planes and everything known about them out.
+//! The engine: generates images with ground truth from a recipe, a model, a seed and an index.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -14,32 +14,32 @@ use crate::scene::{self, Scene, WeightMap};
 use crate::threads::Threads;
 use crate::transmit::MicroscopeCache;
 
-/// What a recipe names but does not hold.
+/// Inputs that a recipe refers to.
 #[derive(Debug, Clone, Default)]
 pub struct Inputs {
-    /// The image that `layout.path` names, for [`Layout::DensityMap`](crate::recipe::Layout::DensityMap): brightness 0 to 1;
-    /// for [`Layout::Labels`](crate::recipe::Layout::Labels): 1 where a label lies, else 0.
+    /// The image at `layout.path`. For [`Layout::DensityMap`](crate::recipe::Layout::DensityMap) grey levels from 0 to 1; for
+    /// [`Layout::Labels`](crate::recipe::Layout::Labels) 1 where there is a label, else 0.
     pub weight_map: Option<WeightMap>,
-    /// What adds up how long the stages take.
+    /// Accumulates the durations of the stages.
     pub profile: Option<Arc<Profile>>,
 }
 
-/// Makes images of one recipe and one model.
+/// Generates images of a recipe and a model.
 #[derive(Debug)]
 pub struct Engine {
     pub(crate) model: Model,
     weight_map: Option<WeightMap>,
     pub(crate) assets: PhantomAssets,
     pub(crate) microscopes: MicroscopeCache,
-    /// Memory of finished images: as many as were ever made side by side.
+    /// Reusable memory: one element per image generated at the same time.
     free_buffers: Mutex<Vec<FrameBuffers>>,
 }
 
 impl Engine {
-    /// Checks the recipe against the model and prepares what all images share.
+    /// Checks the recipe and the model, and prepares the data that all images share.
     ///
     /// # Errors
-    /// If the recipe or the model cannot be used: which field, which value, what would be accepted.
+    /// If the recipe or the model is invalid: the field, its value, and what is accepted.
     pub fn new(recipe: &Recipe, model: &Model, inputs: &Inputs) -> Result<Self, Error> {
         let problems = recipe.problems();
         if !problems.is_empty() {
@@ -58,24 +58,24 @@ impl Engine {
         })
     }
 
-    /// The recipe of this engine.
+    /// Returns the recipe.
     #[must_use]
     pub fn recipe(&self) -> &Recipe {
         &self.assets.recipe
     }
 
-    /// Draws what lies on the slide.
+    /// Draws the objects of a field and how it is imaged.
     ///
     /// # Errors
-    /// If the layout has no room for what is asked.
+    /// If no draw can succeed, as when the layout is too uneven. Cells that do not fit are no error: see [`Scene::cells`].
     pub fn scene(&self, key: Key) -> Result<Scene, Error> {
         self.assets.timer.time(Stage::Scene, || scene::draw(self.recipe(), &self.model, self.weight_map.as_ref(), key))
     }
 
-    /// Makes an image and its truth, showing each plane as soon as it is done. Its memory is that of the next.
+    /// Generates an image with ground truth, and passes each plane to `sink` when it is finished. The memory of a plane is reused.
     ///
     /// # Errors
-    /// What `sink` returned, or why the scene cannot be drawn.
+    /// The error of `sink`, or of the scene.
     pub fn stream<E: From<Error>>(
         &self,
         key: Key,
@@ -86,10 +86,10 @@ impl Engine {
         self.image(scene, threads, sink)
     }
 
-    /// Images a scene, which may have been drawn for another microscope or changed by hand.
+    /// Images a scene. The scene may be drawn for another microscope or edited.
     ///
     /// # Errors
-    /// What `sink` returned, or why the scene cannot be imaged.
+    /// The error of `sink`, or of the scene.
     pub fn image<E: From<Error>>(
         &self,
         scene: Scene,
@@ -108,7 +108,7 @@ impl Engine {
         })
     }
 
-    /// Works in the memory of finished images, and leaves it to the next one.
+    /// Runs `work` with reusable memory.
     pub(crate) fn with_buffers<T>(&self, work: impl FnOnce(&mut FrameBuffers) -> T) -> T {
         let mut buffers = self.free_buffers().pop().unwrap_or_default();
         let made = work(&mut buffers);
@@ -120,10 +120,10 @@ impl Engine {
         self.free_buffers.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Makes an image and its truth, whole.
+    /// Generates an image with ground truth.
     ///
     /// # Errors
-    /// If the scene cannot be drawn.
+    /// The error of the scene.
     pub fn frame(&self, key: Key) -> Result<Frame, Error> {
         let mut planes = Vec::new();
         let finished = self.stream::<Error>(key, Threads::All, |plane| {

@@ -1,338 +1,342 @@
-//! What can go wrong.
+//! The errors of the engine.
 
-/// Why an engine cannot be made, or an image not drawn.
+/// An error of the engine.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The recipe asks for something that cannot be.
-    #[error("the recipe has {} that cannot be:{}", count(.0), list(.0))]
-    Recipe(Vec<Problem>),
-    /// The model cannot be used.
-    #[error("the model: {0}")]
+    /// The recipe has invalid fields.
+    #[error("{} in the recipe:{}", count(.0), list(.0))]
+    Recipe(Vec<InvalidField>),
+    /// The model is invalid.
+    #[error("model: {0}")]
     Model(#[source] Cause),
-    /// A class cannot be learned from the material given.
+    /// A class cannot be learned from the given images.
     #[error("class `{class}` cannot be learned: {cause}")]
     Learn {
         /// The class.
         class: String,
-        /// Why, and what would help.
+        /// The cause.
         #[source]
         cause: Cause,
     },
-    /// The weight map or label image that the layout names was not given, or cannot be used.
+    /// The density map or label image of the layout is missing or invalid.
     #[error("layout: {0}")]
     Layout(#[source] Cause),
-    /// A scene that was read is not valid.
-    #[error("the scene: {0}")]
+    /// A scene is invalid.
+    #[error("scene: {0}")]
     Scene(#[source] Cause),
-    /// An image cannot be drawn from this recipe.
-    #[error("image {index} cannot be drawn: {cause}")]
+    /// An image cannot be generated.
+    #[error("image {index}: {cause}")]
     Image {
         /// Index of the image.
         index: u64,
-        /// Why, and what would help.
+        /// The cause.
         #[source]
         cause: Cause,
     },
 }
 
-/// The cause of an [`Error`]: which field or object, which value, and what is accepted.
+/// The cause of an [`Error`], with the field or object, its value, and what is accepted.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Cause {
-    /// A number lies outside its range.
-    #[error("{field}: {value} is outside {low} to {high}")]
+    /// A number is out of range.
+    #[error("{field}: {value} is out of range: expected {low} to {high}")]
     OutOfRange {
         /// Path of the field.
         field: String,
-        /// Its value.
+        /// The value.
         value: f64,
-        /// The least accepted value.
+        /// The smallest accepted value.
         low: f64,
         /// The largest accepted value.
         high: f64,
     },
     /// A profile of a model is empty.
-    #[error("{0}: it is empty; expected at least one number")]
+    #[error("{0}: expected at least 1 number, found none")]
     EmptyProfile(String),
-    /// A class of a model has no usable name.
-    #[error("classes: `{0}` is no name; expected letters, digits, `-` and `_`")]
+    /// The name of a class of a model is invalid.
+    #[error("classes: invalid name `{0}`; expected letters, digits, `-` and `_`")]
     ClassName(String),
-    /// The model lacks a class; second, those that it has.
-    #[error("the model has no class `{}`; it has {}", .0, .1.join(", "))]
+    /// The model does not have a class; second, the classes that it has.
+    #[error("the model has no class `{}`; its classes are {}", .0, .1.join(", "))]
     UnknownClass(String, Vec<String>),
-    /// Statistics of outlines do not fit together.
+    /// The statistics of outlines are inconsistent.
     #[error("{0}: {1}")]
     Shapes(String, #[source] fsd_shape::Error),
-    /// The pixels of a donor are not whole rows.
-    #[error("{field}.width: {width} does not divide its {pixels} pixels into rows")]
+    /// The number of pixels of a donor is not a multiple of its width.
+    #[error("{field}.width: {pixels} pixels are not a multiple of the width {width}")]
     DonorSize {
         /// Path of the donor.
         field: String,
-        /// Its columns.
+        /// The number of columns.
         width: usize,
-        /// Its pixels.
+        /// The number of pixels.
         pixels: usize,
     },
     /// A donor has no pixel inside its nucleus.
-    #[error("{0}.absorbance_milli: no pixel lies inside the nucleus")]
+    #[error("{0}.absorbance_milli: no pixel is inside the nucleus")]
     EmptyDonor(String),
-    /// The donors of a class differ in the size of their pixels.
-    #[error("classes.{0}.nucleus.donors: their pixels differ in size; expected one size")]
+    /// The donors of a class have different pixel sizes.
+    #[error("classes.{0}.nucleus.donors: the pixel sizes differ; expected the same pixel size")]
     DonorPixels(String),
-    /// A donor cannot be used as a texture.
+    /// A donor is invalid as a texture.
     #[error("nucleus.donors: {0}")]
     Donor(#[source] quilt_texture::Error),
-    /// A text is not JSON, or no model.
-    #[error("this is no model of papsynth: {0}")]
+    /// A text is not a model in JSON.
+    #[error("not a model of papsynth: {0}")]
     NotAModel(#[source] serde_json::Error),
-    /// A text is not TOML.
-    #[error("this is no class file of papsynth: {0}")]
+    /// A text is not a class file in TOML.
+    #[error("not a class file of papsynth: {0}")]
     NotAClassFile(#[source] toml::de::Error),
-    /// The text of a model is not a table.
-    #[error("this is no model of papsynth: it is no table")]
+    /// The text of a model is not an object.
+    #[error("not a model of papsynth: expected a JSON object")]
     NotATable,
-    /// A model of another version, and the version that is accepted.
-    #[error("its version is {0}; this program reads version {1}")]
+    /// A model of another version, and the accepted version.
+    #[error("version {0} is not supported: this program reads version {1}")]
     ModelVersion(String, u32),
-    /// A field of a model or of a scene has another type, is missing, or is not known.
+    /// A field of a model or of a scene has a wrong type, is missing, or is unknown.
     #[error(transparent)]
     Json(#[from] serde_json::Error),
-    /// The provenance of a class file cannot be read.
+    /// The provenance of a class file is invalid.
     #[error("provenance: {0}")]
     Provenance(#[source] serde_json::Error),
     /// The classes of a class file are not a table.
     #[error("classes: expected a table of classes by name")]
     ClassesNotATable,
-    /// A class file has a field that it must not have.
-    #[error("`{0}` is not known here; expected version, provenance, classes")]
+    /// A class file has an unknown key.
+    #[error("unknown key `{0}`; expected `version`, `provenance` or `classes`")]
     UnknownField(String),
-    /// Classes refer to each other with `like` in a circle.
-    #[error("classes {} are like each other in a circle", .0.join(", "))]
+    /// Classes refer to each other with `like` in a cycle.
+    #[error("classes {} form a cycle of `like`", .0.join(", "))]
     ClassCircle(Vec<String>),
-    /// A class of a class file cannot be used.
+    /// A class of a class file is invalid.
     #[error("classes.{class}: {cause}")]
     Class {
-        /// Its name.
+        /// The name of the class.
         class: String,
-        /// Why.
+        /// The cause.
         #[source]
         cause: Box<Cause>,
     },
 
-    /// The pixels of learning material have no usable size.
-    #[error("pixel size {0} µm is outside 0.05 to 4")]
+    /// The pixel size of images to learn from is out of range.
+    #[error("pixel size: {0} µm is out of range: expected 0.05 to 4")]
     PixelSize(f64),
     /// Too few outlines.
-    #[error("{found} outlines of the {what} are too few; expected at least {least}")]
+    #[error("{found} outlines of the {what}; expected at least {least}")]
     TooFewOutlines {
-        /// How many there are.
+        /// Number of outlines.
         found: usize,
-        /// Of what: cell or nucleus.
+        /// Their part: cell or nucleus.
         what: &'static str,
-        /// How many are needed.
+        /// Minimum number.
         least: usize,
     },
-    /// An outline, by its index, crosses itself.
-    #[error("outline {0} of the {1} crosses itself; expected simple closed curves")]
+    /// An outline, by its index, intersects itself.
+    #[error("outline {0} of the {1} intersects itself; expected simple closed curves")]
     CrossedOutline(usize, &'static str),
-    /// No model of shapes fits the outlines of cells or nuclei.
+    /// The model of shapes cannot be fitted to the outlines of cells or nuclei.
     #[error("outlines of the {0}: {1}")]
     Outlines(&'static str, #[source] fsd_shape::Error),
-    /// The image of a nucleus cannot be used.
-    #[error("{name}: {flaw}")]
+    /// The image of a nucleus is invalid.
+    #[error("{name}: {cause}")]
     Nucleus {
         /// Name of the image.
         name: String,
-        /// Why.
+        /// The cause.
         #[source]
-        flaw: Flaw,
+        cause: NucleusError,
     },
 
-    /// The layout names a file that was not given.
-    #[error("`layout.path` = \"{path}\" names {what} that was not given")]
+    /// The file of the layout was not given.
+    #[error("layout.path: \"{path}\" was not given; expected {what}")]
     NotGiven {
         /// The file.
         path: String,
-        /// What it should hold.
+        /// Its expected content.
         what: &'static str,
     },
-    /// The file that the layout names cannot be used as a weight map.
+    /// The file of the layout is not a valid density map.
     #[error("\"{path}\": {cause}")]
     Map {
         /// The file.
         path: String,
-        /// Why.
+        /// The cause.
         #[source]
         cause: Box<Cause>,
     },
-    /// The pixels of a weight map, first, are not whole rows of a width.
-    #[error("a weight map of {0} pixels cannot have rows of {1}")]
+    /// The number of pixels of a weight map, first, is not a multiple of its width.
+    #[error("a weight map of {0} pixels cannot have rows of {1} pixels")]
     MapSize(usize, usize),
     /// A weight is negative or not finite.
-    #[error("the weight at pixel ({x}, {y}) is {weight}; expected a finite number of 0 or more")]
+    #[error("weight {weight} at pixel ({x}, {y}); expected a finite number of at least 0")]
     Weight {
-        /// Its column.
+        /// The column.
         x: usize,
-        /// Its row.
+        /// The row.
         y: usize,
         /// The weight.
         weight: f32,
     },
     /// A weight map has no weight above zero.
-    #[error("every weight is zero, so no object can ever be placed; expected at least one place above zero")]
+    #[error("all weights are zero; expected at least one weight above zero")]
     NoWeight,
     /// The labels of a layout cannot be smoothed.
     #[error("layout.smooth_um: {0}")]
     Smoothing(#[source] optics_psf::Error),
-    /// More cells than the layout has room for.
+    /// More cells than fit into the field.
     #[error(
-        "{count} cells at least {spacing_um} µm apart do not fit where the layout lets them lie ({area_um2:.0} µm²): \
-         at most about {room:.0} do; ask for fewer `cells`, a smaller `slide.spacing_um` or a larger field"
+        "{count} cells with a spacing of {spacing_um} µm do not fit into {area_um2:.0} µm², about {room:.0} do: reduce \
+         `cells` or `slide.spacing_um`, or enlarge the field"
     )]
     NoRoom {
-        /// Cells.
+        /// Number of cells.
         count: usize,
-        /// Least distance, µm.
+        /// Minimum distance, µm.
         spacing_um: f64,
-        /// Area that they may lie in, µm².
+        /// Area where the layout allows cells, µm².
         area_um2: f64,
-        /// How many fit.
+        /// Number of cells that fit.
         room: f64,
     },
-    /// Placing the cells would take too many tries.
+    /// The placement of the cells takes too many tries.
     #[error(
-        "the weight map is so uneven that {count} cells would take about {tries:.0e} tries; \
-         expected at most {most:.0e}: raise its dark parts, or ask for fewer `cells`"
+        "{count} cells take about {tries:.0e} tries with this uneven layout; expected at most {most:.0e}: raise the low \
+         weights, or reduce `cells`"
     )]
     TooUneven {
-        /// Cells.
+        /// Number of cells.
         count: usize,
-        /// Tries expected.
+        /// Expected number of tries.
         tries: f64,
-        /// Tries accepted.
+        /// Largest accepted number of tries.
         most: f64,
     },
-    /// No place is left that is far enough from all cells placed so far.
+    /// No place is left that is far enough from all other cells.
     #[error(
-        "after {placed} cells no place is left that is {spacing_um} µm from all others; ask for fewer `cells`, a \
-         smaller `slide.spacing_um` or a larger field"
+        "no place is left after {placed} cells with a spacing of {spacing_um} µm: reduce `cells` or `slide.spacing_um`, or \
+         enlarge the field"
     )]
     Crowded {
-        /// Cells placed so far.
+        /// Number of cells placed.
         placed: usize,
-        /// Least distance, µm.
+        /// Minimum distance, µm.
         spacing_um: f64,
     },
-    /// More objects than labels can number.
-    #[error("{0} objects are more than labels can number; ask for fewer")]
+    /// More objects than 32-bit labels.
+    #[error("{0} objects; labels allow at most 4294967295")]
     TooManyObjects(usize),
 
-    /// The layout is not one of whole slides.
-    #[error("layout.kind: slides know `uniform` and `clusters`; others describe one field")]
+    /// The layout is not available for whole slides.
+    #[error("layout.kind: expected `uniform` or `clusters` for a whole slide")]
     LayoutOfField,
-    /// Clusters too wide for the pixels of a slide.
-    #[error("layout.radius_um: up to {0} is too wide for a slide of such pixels; expected at most {1:.0}")]
+    /// The clusters are too wide for a slide with its pixel size.
+    #[error("layout.radius_um: {0} is out of range for a slide with this pixel size: expected at most {1:.0}")]
     WideClusters(f64, f64),
-    /// More objects in a square of a slide than it can number.
+    /// More objects in a square of a slide than it has numbers.
     #[error(
-        "{found} objects lie in a square of {side_px} x {side_px} pixels; a slide can number {most} there: ask for fewer"
+        "{found} objects in a square of {side_px} x {side_px} pixels of the slide; expected at most {most}: reduce `cells` or \
+         `debris`"
     )]
     FullPlot {
-        /// Side of the square, pixels.
+        /// Size of the square, pixels.
         side_px: i64,
-        /// How many there are.
+        /// Number of objects.
         found: usize,
-        /// How many can be numbered.
+        /// Largest accepted number.
         most: usize,
     },
-    /// An object of a slide reaches too far.
+    /// The image of an object of a slide is too large.
     #[error(
-        "a {kind} reaches {reach_um:.0} µm at its place and depth, farther than `scan.max_object_radius_um` = {most_um}: raise that, or \
-         make it smaller or nearer to focus"
+        "the image of a {kind} has a radius of {reach_um:.0} µm, above `scan.max_object_radius_um` = {most_um}: increase \
+         this key, or reduce the size or the depth of the object"
     )]
     TooFar {
-        /// Its kind.
+        /// Kind of the object.
         kind: &'static str,
-        /// How far it reaches, µm.
+        /// Radius of its image, µm.
         reach_um: f64,
-        /// How far it may reach, µm.
+        /// Largest accepted radius, µm.
         most_um: f64,
     },
-    /// A frame, by column and row, is not on the slide, which has so many columns and rows.
-    #[error("frame {:?} is not on the slide, which has {} x {}", .0, .1[0], .1[1])]
+    /// A frame, by column and row, is outside the slide, whose size in frames is second.
+    #[error("frame ({}, {}) is outside the slide of {} x {} frames", .0[0], .0[1], .1[0], .1[1])]
     NoFrame([u32; 2], [u32; 2]),
-    /// A part is not on the slide.
-    #[error("{} x {} pixels from {origin_px:?} on leave the slide of {} x {}", .size_px[0], .size_px[1], .slide_px[0], .slide_px[1])]
+    /// A part is not inside the slide.
+    #[error(
+        "{} x {} pixels at ({}, {}) are not inside the slide of {} x {} pixels",
+        .size_px[0], .size_px[1], .origin_px[0], .origin_px[1], .slide_px[0], .slide_px[1]
+    )]
     OffSlide {
-        /// Its first pixel.
+        /// First pixel of the part.
         origin_px: [u32; 2],
-        /// Its columns and rows.
+        /// Columns and rows of the part.
         size_px: [u32; 2],
-        /// Those of the slide.
+        /// Columns and rows of the slide.
         slide_px: [u32; 2],
     },
 
     /// A text is not JSON.
-    #[error("this is not a scene of papsynth: {0}")]
+    #[error("not a scene of papsynth: {0}")]
     NotAScene(#[source] serde_json::Error),
     /// A scene has no list of objects.
     #[error("objects: expected a list of objects")]
     NoObjects,
-    /// A text or a truth value, second, stands in place of a number.
-    #[error("{0}: {1} is not a number")]
+    /// A string or a boolean, second, in place of a number.
+    #[error("{0}: expected a number, found {1}")]
     NotANumber(String, String),
     /// A scene is a frame of a whole slide.
-    #[error("`frame` and `plot` belong to whole slides; only scenes of single fields are read")]
+    #[error("`frame` and `plot` are keys of whole slides; expected the scene of a single field")]
     SlideScene,
-    /// An object of a scene is not valid.
+    /// An object of a scene is invalid.
     #[error("objects[{index}] (id {id}): {cause}")]
     Object {
-        /// Its place in the list, from 0.
+        /// Index in the list, from 0.
         index: usize,
-        /// Its id, as it was written.
+        /// Id of the object.
         id: serde_json::Value,
-        /// Why.
+        /// The cause.
         #[source]
         cause: Box<Cause>,
     },
     /// Two objects of a scene have the same id.
     #[error("id: another object has the same id")]
     SameId,
-    /// An object reaches too far for the pixels of its scene; second, how far it may reach.
-    #[error("it reaches {0:.0} µm; with pixels of this size at most {1:.0} µm are accepted")]
+    /// An object is too large for the pixel size of its scene; second, the largest accepted radius.
+    #[error("the radius of the object is {0:.0} µm; expected at most {1:.0} µm with this pixel size")]
     Reach(f64, f64),
     /// A cell of the scene has a class that the recipe does not have.
-    #[error("the scene holds a cell of class `{0}`, which its recipe does not")]
+    #[error("the scene has a cell of class `{0}`; the recipe does not have this class")]
     ForeignClass(String),
-    /// The scene's light has three colours, and its optics are Gaussians.
-    #[error("colour is not known to Gaussians")]
+    /// The light of the scene is colour, and its optics are Gaussian.
+    #[error("colour needs bright-field optics, found Gaussian optics")]
     ColourWithGaussians,
-    /// Optics cannot be computed; first, the field.
+    /// Invalid optics; first, the field.
     #[error("{0}: {1}")]
     Optics(&'static str, #[source] optics_psf::Error),
-    /// The light cannot be computed.
+    /// Invalid light.
     #[error("light: {0}")]
     Light(#[from] dye_spectra::Error),
-    /// The background cannot be computed.
+    /// Invalid background.
     #[error("background: {0}")]
     Background(#[from] perlin_bg::Error),
-    /// The camera cannot be simulated.
+    /// Invalid camera.
     #[error("camera: {0}")]
     Camera(#[from] ccd_noise::Error),
-    /// An outline cannot be drawn or measured.
+    /// An invalid outline.
     #[error(transparent)]
     Outline(#[from] fsd_shape::Error),
-    /// A sheet cannot be pressed or folded.
+    /// An invalid sheet.
     #[error(transparent)]
     Sheet(#[from] cloth_verlet::Error),
-    /// A cytoskeleton cannot be grown.
+    /// An invalid cytoskeleton.
     #[error(transparent)]
     Cytoskeleton(#[from] voronoi_cytoskeleton::Error),
-    /// A texture cannot be made of donors.
+    /// An invalid texture from donors.
     #[error(transparent)]
     Texture(#[from] quilt_texture::Error),
-    /// A texture cannot be drawn from its spectrum.
+    /// An invalid spectrum of a texture.
     #[error(transparent)]
     Spectrum(#[from] spectral_field::Error),
 }
@@ -343,7 +347,7 @@ impl From<optics_psf::Error> for Cause {
     }
 }
 
-/// Refuses a number that is not finite or lies outside a range.
+/// Checks that a number is finite and in a range.
 pub(crate) fn within(field: &str, value: f64, [low, high]: [f64; 2]) -> Result<(), Cause> {
     if value.is_finite() && (low..=high).contains(&value) {
         return Ok(());
@@ -351,12 +355,12 @@ pub(crate) fn within(field: &str, value: f64, [low, high]: [f64; 2]) -> Result<(
     Err(Cause::OutOfRange { field: field.to_owned(), value, low, high })
 }
 
-/// Why the image of a nucleus cannot be learned from.
+/// An invalid image of a nucleus to learn from.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum Flaw {
-    /// Image and mask are not two images of the same size.
-    #[error("its image has {pixels} pixels, its mask {mask}; expected as many, in rows of {width}")]
+pub enum NucleusError {
+    /// Image and mask have different sizes.
+    #[error("the image has {pixels} pixels, the mask {mask}; expected the same number, in rows of {width}")]
     Size {
         /// Pixels of the image.
         pixels: usize,
@@ -366,42 +370,42 @@ pub enum Flaw {
         width: usize,
     },
     /// A pixel, by column and row, is negative or not finite.
-    #[error("pixel ({0}, {1}) is {2}")]
+    #[error("pixel ({0}, {1}) is {2}; expected a finite number of at least 0")]
     Pixel(usize, usize, f32),
     /// The mask has no single outline.
-    #[error("its mask: {0}")]
+    #[error("mask: {0}")]
     Mask(#[source] fsd_shape::Error),
     /// Too few pixels around the mask.
-    #[error("only {0} pixels surround its mask; expected a wider crop")]
+    #[error("{0} pixels around the mask; expected a larger crop")]
     Crop(usize),
     /// No light around the mask.
-    #[error("its surroundings are black")]
+    #[error("the pixels around the mask are black")]
     Black,
-    /// Too few pixels, and the least number that is accepted.
-    #[error("its mask has {0} pixels; expected at least {1}")]
+    /// Too few pixels, and the minimum number.
+    #[error("the mask has {0} pixels; expected at least {1}")]
     SmallMask(usize, usize),
-    /// Too little absorbance, and the least that is accepted.
-    #[error("its mean absorbance is {0:.4}, at least {1} is expected: a nucleus is darker than its surroundings")]
+    /// Too little absorbance, and the minimum.
+    #[error("mean absorbance {0:.4}; expected at least {1}: a nucleus is darker than the pixels around it")]
     Faint(f64, f64),
 }
 
-/// Something wrong with a recipe.
+/// An invalid field of a recipe.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{field}: {message}")]
-pub struct Problem {
-    /// The field, as a dotted path: `optics.sigma_xy_um`.
+pub struct InvalidField {
+    /// The dotted path of the field, such as `optics.sigma_xy_um`.
     pub field: String,
-    /// What is wrong with it: the value, and what would be accepted.
+    /// The value, what is wrong with it, and what is accepted.
     pub message: String,
 }
 
-fn count(problems: &[Problem]) -> String {
-    match problems.len() {
-        1 => "a field".to_owned(),
-        n => format!("{n} fields"),
+fn count(fields: &[InvalidField]) -> String {
+    match fields.len() {
+        1 => "1 invalid field".to_owned(),
+        n => format!("{n} invalid fields"),
     }
 }
 
-fn list(problems: &[Problem]) -> String {
-    problems.iter().map(|p| format!("\n  {p}")).collect()
+fn list(fields: &[InvalidField]) -> String {
+    fields.iter().map(|p| format!("\n  {p}")).collect()
 }

@@ -1,39 +1,38 @@
 //! Streams of random numbers, one for every purpose.
 //!
-//! An image is a function of `(seed, index)`; every object of it, and every purpose within an object, has a
-//! stream of its own. Adding one speckle therefore moves no nucleus, and the order in which objects are made,
-//! or the thread that makes them, changes nothing.
+//! An image is a function of `(seed, index)`. Each object, and each purpose within an object, has a separate stream. An
+//! additional speckle therefore moves no nucleus, and results do not depend on the order of objects or on threads.
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use sha2::{Digest, Sha256};
 
-/// The generator behind every stream: xoshiro256++, whose output is fixed by its 256-bit state alone.
+/// The generator of all streams: xoshiro256++, whose output is determined by its 256-bit state.
 pub type Stream = Xoshiro256PlusPlus;
 
-/// Version of the mapping from keys to numbers, and from numbers to images. It changes when the same recipe,
-/// model, seed and index would give another image, and is recorded with every data set.
+/// Version of the mapping from keys to numbers, and from numbers to images. It changes if the same recipe, model, seed and index
+/// give another image, and is recorded in each data set.
 pub const STREAM_VERSION: u32 = 5;
 
-/// The [`STREAM_VERSION`] that last changed the random numbers themselves: versions since then draw the same numbers.
+/// The last [`STREAM_VERSION`] that changed the random numbers.
 const NUMBERS_VERSION: u32 = 3;
 
-/// What names one image: the seed of the data set and the index of the image in it.
+/// The key of an image: the seed of the data set and the index of the image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub struct Key {
-    /// Seed of the whole data set.
+    /// Seed of the data set.
     pub seed: u64,
     /// Index of the image, counted from 0.
     pub index: u64,
 }
 
 impl Key {
-    /// The key of a plot of a whole slide, whose own key this is.
+    /// Returns the key of a plot of a whole slide with this key.
     pub(crate) fn plot(self, number: u32) -> Self {
         self.part(0, number)
     }
 
-    /// The key of a frame of a whole slide, whose own key this is.
+    /// Returns the key of a frame of a whole slide with this key.
     pub(crate) fn frame(self, number: u32) -> Self {
         self.part(1, number)
     }
@@ -46,16 +45,16 @@ impl Key {
         Self { seed: self.stream("field", attempt.into(), "attempt").next_u64(), ..self }
     }
 
-    /// The upper bit tells parts of slides from images; slides are numbered below 2³⁰.
+    /// The upper bit distinguishes parts of slides from images; slide numbers are below 2³⁰.
     fn part(self, kind: u64, number: u32) -> Self {
         let slide = self.index & ((1 << 30) - 1);
         Self { seed: self.seed, index: 1 << 63 | kind << 62 | slide << 32 | u64::from(number) }
     }
 
-    /// The stream of one purpose of one object.
+    /// Returns the stream of a purpose of an object.
     ///
-    /// `kind` names the kind of object ("cell", "speckle", …, or "field" for what belongs to the whole image),
-    /// `object` counts within that kind, `purpose` says what the numbers are for.
+    /// `kind` is the kind of object ("cell", "speckle", …, or "field" for the complete image), `object` its number within the
+    /// kind, `purpose` the use of the numbers.
     #[must_use]
     pub fn stream(&self, kind: &str, object: u64, purpose: &str) -> Stream {
         let mut hash = Sha256::new();
@@ -77,7 +76,7 @@ mod tests {
     use rand_core::Rng;
 
     #[test]
-    fn every_part_of_a_name_matters() {
+    fn every_part_of_a_key_changes_the_stream() {
         let key = Key { seed: 1, index: 2 };
         let first = key.stream("cell", 3, "outline").next_u64();
         assert_eq!(first, key.stream("cell", 3, "outline").next_u64());

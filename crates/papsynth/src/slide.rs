@@ -1,23 +1,23 @@
-//! Whole slides, larger than memory: any part of one can be made alone.
+//! Whole slides, larger than memory: any part of a slide can be generated alone.
 //!
-//! A scanner's camera sees a slide frame by frame, and so does the engine. Frames lie on a lattice that begins at the slide's
-//! first pixel. Each is lit and exposed by itself, on a border of pixels that is cut off again; what lies on it is drawn from
-//! plots that do not depend on frames (`scene/plots.rs`), and every object is imaged in a patch of its own, so that
-//! frames join without a seam. A part of the slide is cut from the frames that it meets: its size cannot change a pixel.
+//! The engine images a slide frame by frame, like the camera of a scanner. Frames form a grid that starts at the first pixel of
+//! the slide. Each frame is illuminated and exposed separately, with a border that is cropped. Objects are drawn per plot,
+//! independently of frames (`scene/plots.rs`), and each object is imaged in a separate patch, so that frames join without seams.
+//! A part of the slide is cropped from the frames that it overlaps: its size and position do not change a pixel.
 
 use std::sync::Arc;
 
 use crate::engine::Engine;
 use crate::error::{Cause, Error};
 use crate::key::Key;
-use crate::recipe::{Imaging, Optics, Problem};
+use crate::recipe::{Imaging, InvalidField, Optics};
 use crate::render::Rendering;
 use crate::scene::{BEYOND, Object, PLOT_PX, Plot, Population, Scene, SlideFrame, View};
 use crate::threads::{self, Threads};
 use crate::transmit::{self, LightPath};
 use crate::truth::{Group, LabelMap, ObjectTruth};
 
-/// A whole slide of an engine's recipe and model.
+/// A whole slide of the recipe and the model of an engine.
 ///
 /// ```
 /// use papsynth::model::Model;
@@ -36,11 +36,11 @@ pub struct Slide<'a> {
     engine: &'a Engine,
     number: u64,
     population: Population,
-    /// The slide without anything on it.
+    /// The scene of the empty slide.
     empty: Scene,
-    /// How the optics spread what lies on it.
+    /// The optics.
     path: LightPath,
-    /// Pixels round a frame that are exposed with it and cut off.
+    /// Width of the border around a frame that is exposed and cropped, pixels.
     border_px: i64,
 }
 
@@ -50,58 +50,62 @@ impl core::fmt::Debug for Slide<'_> {
     }
 }
 
-/// A part of a slide: an image and what is known of it.
+/// A part of a slide: an image with ground truth.
 #[derive(Debug, Clone)]
 pub struct SlidePart {
-    /// Column and row of its first pixel on the slide.
+    /// Column and row of the first pixel on the slide.
     pub origin_px: [u32; 2],
     /// Columns and rows.
     pub size_px: [u32; 2],
-    /// Its focal planes.
+    /// Focal planes.
     pub planes: Vec<PartPlane>,
-    /// The id of the front-most object at each pixel, 0 where there is none: of cytoplasm, nuclei and debris, in the order of
-    /// [`Group::ALL`]. Layers of dirt have no ids.
+    /// Label maps of cytoplasm, nuclei and debris, in the order of [`Group::ALL`]: the id of the topmost object at each pixel, 0
+    /// if there is none. Dirt has no ids.
     pub labels: Vec<LabelMap>,
-    /// Number of cytoplasms that lie over each other at each pixel.
+    /// Number of overlapping cytoplasms at each pixel.
     pub layers: Vec<u16>,
-    /// A row for every object whose middle lies in this part, and for every part of a cell. Masks and places are those on the
-    /// slide; masks are whole, also where they leave this part. `front` is empty: `labels` show what lies in front.
+    /// Ground truth of each object whose centre is in this part, and of each part of a cell. Masks and places are in pixels of the
+    /// slide; masks are complete, also outside this part. Visible masks are empty: see `labels`.
     pub objects: Vec<ObjectTruth>,
 }
 
 /// A focal plane of a part of a slide.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PartPlane {
-    /// Travel of the stage, µm.
+    /// Position of the stage, µm.
     pub stage_um: f64,
-    /// Grey levels, row by row, the channels of a pixel side by side.
+    /// Grey levels, row by row, with interleaved channels.
     pub grey: Vec<u16>,
-    /// The same without noise and before rounding; empty where it was not asked for.
+    /// Grey levels without noise, before rounding; empty if not requested.
     pub noise_free: Vec<f32>,
 }
 
 impl Engine {
-    /// A whole slide: `number` tells the slides of a seed apart.
+    /// Returns the whole slide with this number. The slides of a seed have different numbers.
     ///
     /// # Errors
-    /// If the recipe asks for what is not to be had on a slide: which field, which value, what would be accepted.
+    /// If the recipe is not valid for a slide: the field, its value, and what is accepted.
     pub fn slide(&self, seed: u64, number: u64) -> Result<Slide<'_>, Error> {
         Slide::new(self, seed, number)
     }
 }
 
 impl<'a> Slide<'a> {
-    /// Largest number of a slide.
+    /// Largest slide number.
     pub const LAST: u64 = (1 << 30) - 1;
 
     fn new(engine: &'a Engine, seed: u64, number: u64) -> Result<Self, Error> {
         let recipe = engine.recipe();
-        let fail = |field: &str, message: String| Error::Recipe(vec![Problem { field: field.to_owned(), message }]);
+        let fail =
+            |field: &str, message: String| Error::Recipe(vec![InvalidField { field: field.to_owned(), message }]);
         if number > Self::LAST {
-            return Err(fail("slide", format!("{number} is no number of a slide; expected 0 to {}", Self::LAST)));
+            return Err(fail("slide", format!("{number} is out of range: expected 0 to {}", Self::LAST)));
         }
         if matches!(&recipe.optics, Optics::BrightField(microscope) if microscope.imaging == Imaging::Abbe) {
-            return Err(fail("optics.imaging", "\"abbe\" images whole fields; slides know \"product\"".to_owned()));
+            return Err(fail(
+                "optics.imaging",
+                "\"abbe\" is not available for slides: expected \"product\"".to_owned(),
+            ));
         }
         let key = Key { seed, index: number };
         let (population, mut empty) = Population::new(recipe, &engine.model, key).map_err(Error::Layout)?;
@@ -114,7 +118,7 @@ impl<'a> Slide<'a> {
         let most = (BEYOND - 1) as f64 * PLOT_PX as f64;
         if reach_px > most {
             let message = format!(
-                "{} is too far for pixels of {} µm; expected at most {:.0}",
+                "{} is out of range for pixels of {} µm: expected at most {:.0}",
                 recipe.scan.max_object_radius_um,
                 empty.view.pixel_um,
                 most * empty.view.pixel_um
@@ -124,65 +128,65 @@ impl<'a> Slide<'a> {
         Ok(Self { engine, number, population, empty, path, border_px })
     }
 
-    /// Columns and rows of the slide.
+    /// Returns the columns and rows of the slide.
     #[must_use]
     pub fn size_px(&self) -> [u32; 2] {
         let scan = &self.engine.recipe().scan;
         [scan.width_px, scan.height_px]
     }
 
-    /// The slide's number.
+    /// Returns the number of the slide.
     #[must_use]
     pub fn number(&self) -> u64 {
         self.number
     }
 
-    /// Size of a pixel, µm.
+    /// Returns the pixel size, µm.
     #[must_use]
     pub fn pixel_um(&self) -> f64 {
         self.empty.view.pixel_um
     }
 
-    /// Travels of the stage to the focal planes, µm.
+    /// Returns the positions of the stage at the focal planes, µm.
     #[must_use]
     pub fn planes_um(&self) -> &[f64] {
         &self.empty.planes_um
     }
 
-    /// Channels of a pixel: 1 or 3.
+    /// Returns the number of channels: 1 or 3.
     #[must_use]
     pub fn channels(&self) -> usize {
         self.empty.channels()
     }
 
-    /// Bits of a grey level.
+    /// Returns the bit depth of grey levels.
     #[must_use]
     pub fn bits(&self) -> u32 {
         self.empty.camera.bits
     }
 
-    /// Middle of the deposit, µm from the slide's first pixel; it may lie beside the slide.
+    /// Returns the centre of the deposit, µm from the first pixel of the slide. It may be outside the slide.
     #[must_use]
     pub fn deposit_um(&self) -> [f64; 2] {
         self.population.middle_um()
     }
 
-    /// Columns and rows of frames.
+    /// Returns the columns and rows of frames.
     #[must_use]
     pub fn frames(&self) -> [u32; 2] {
         self.size_px().map(|side| side.div_ceil(self.side_px()))
     }
 
-    /// Side of a frame in pixels.
+    /// Returns the size of a frame, pixels.
     #[must_use]
     pub fn side_px(&self) -> u32 {
         self.engine.recipe().scan.frame_px
     }
 
-    /// Everything that may be seen in a part of the slide, by id. No pixel is touched.
+    /// Returns all objects that may be visible in a part of the slide, by id. No image is computed.
     ///
     /// # Errors
-    /// If an object reaches farther than `scan.max_object_radius_um`, or a plot holds more objects than can be numbered.
+    /// If the image of an object is larger than `scan.max_object_radius_um`, or a plot has too many objects.
     pub fn objects(&self, origin_px: [u32; 2], size_px: [u32; 2]) -> Result<Vec<Object>, Error> {
         let low = origin_px.map(i64::from);
         let high = [0, 1].map(|axis| low[axis] + i64::from(size_px[axis]));
@@ -193,7 +197,7 @@ impl<'a> Slide<'a> {
         Error::Image { index: self.number, cause }
     }
 
-    /// The objects that reach into a rectangle of the slide, from `low` up to `high`, their plots counted from `low`.
+    /// Returns the objects that reach into the rectangle of the slide from `low` to `high`. Positions of plots are relative to `low`.
     fn reaching(&self, low: [i64; 2], high: [i64; 2]) -> Result<Vec<Object>, Cause> {
         let pixel_um = self.pixel_um();
         let most_um = self.engine.recipe().scan.max_object_radius_um;
@@ -230,10 +234,10 @@ impl<'a> Slide<'a> {
         Ok(found)
     }
 
-    /// A frame: all of it that lies on the slide.
+    /// Returns a frame, cropped to the slide.
     ///
     /// # Errors
-    /// As [`Slide::objects`], or if a frame of that column and row is not on the slide.
+    /// As [`Slide::objects`], or if the frame is outside the slide.
     pub fn frame(&self, at: [u32; 2], threads: Threads) -> Result<SlidePart, Error> {
         let frames = self.frames();
         if at[0] >= frames[0] || at[1] >= frames[1] {
@@ -242,7 +246,7 @@ impl<'a> Slide<'a> {
         self.expose(at, [0, 0], self.size_px(), threads, true).map_err(|cause| self.fail(cause))
     }
 
-    /// What of a part of the slide lies in a frame that it meets.
+    /// Returns the intersection of a part of the slide with a frame.
     fn expose(
         &self,
         at: [u32; 2],
@@ -290,15 +294,15 @@ impl<'a> Slide<'a> {
         })
     }
 
-    /// Any part of the slide, cut from the frames that it meets.
+    /// Returns a part of the slide, cropped from the frames that it overlaps.
     ///
     /// # Errors
-    /// As [`Slide::frame`], or if the part leaves the slide.
+    /// As [`Slide::frame`], or if the part is not inside the slide.
     pub fn part(&self, origin_px: [u32; 2], size_px: [u32; 2], threads: Threads) -> Result<SlidePart, Error> {
         self.cut(origin_px, size_px, threads, true)
     }
 
-    /// The same without the noise-free images, which take four times the memory of the picture.
+    /// Returns a part of the slide without noise-free images, which take four times the memory of the image.
     ///
     /// # Errors
     /// As [`Slide::part`].
@@ -324,7 +328,7 @@ impl<'a> Slide<'a> {
         let frames = |axis: usize| origin_px[axis] / side..=(origin_px[axis] + size_px[axis] - 1) / side;
         let mut part = SlidePart::blank(origin_px, size_px, self.planes_um(), self.channels(), noise_free);
         let frames: Vec<[u32; 2]> = frames(1).flat_map(|row| frames(0).map(move |column| [column, row])).collect();
-        // Few at a time, since each takes the memory of a picture.
+        // In chunks, because each frame takes the memory of an image.
         for frames in frames.chunks(threads::count(threads)) {
             let inner = if frames.len() > 1 { Threads::One } else { threads };
             for frame in threads::map(threads, frames, |&at| self.expose(at, origin_px, size_px, inner, noise_free)) {
@@ -355,7 +359,7 @@ impl SlidePart {
         }
     }
 
-    /// Takes in a part that lies within it.
+    /// Copies a part that is inside this part.
     fn lay(&mut self, other: Self, channels: usize) {
         let [x, y] = [0, 1].map(|axis| (other.origin_px[axis] - self.origin_px[axis]) as usize);
         let (width, columns) = (self.size_px[0] as usize, other.size_px[0] as usize);
@@ -377,7 +381,7 @@ impl SlidePart {
     }
 }
 
-/// What is kept of a frame with its border.
+/// The crop of a frame with its border.
 struct Cut {
     /// First column and row.
     first: [usize; 2],

@@ -82,7 +82,7 @@ fn leaves() -> Vec<Leaf> {
 }
 
 fn is_number(value: &Value) -> bool {
-    let laws = ["uniform", "normal", "log_normal", "choice"];
+    let laws = ["uniform", "normal", "log_normal", "choice", "per_mm2"];
     value.is_number() || value.as_object().is_some_and(|table| laws.iter().any(|law| table.contains_key(*law)))
 }
 
@@ -232,11 +232,11 @@ fn what_is_too_large_or_too_deep_is_refused_in_little_memory() {
         (format!("{}b = 1", "a.".repeat(DEEP)), "recipe.toml"),
         (format!("[{}b]\nc = 1", "a.".repeat(DEEP)), "recipe.toml"),
         (format!("field = {{ {} }}", "a = 1, ".repeat(DEEP)), "recipe.toml"),
-        ((0..DEEP / 2).map(|i| format!("a{i} = 1\n")).collect(), "there is no such field"),
+        ((0..DEEP / 2).map(|i| format!("a{i} = 1\n")).collect(), "unknown key `a0`"),
         ("[[field]]\n".repeat(DEEP), "field"),
         (format!("[focus]\nplanes = {{ choice = [{}] }}", "1e300,".repeat(DEEP)), "focus.planes"),
         (format!("[field]\nwidth_px = {}", "9".repeat(DEEP)), "recipe.toml:2"),
-        (format!("[layout]\nkind = \"map\"\npath = {}", "\"".repeat(DEEP)), "recipe.toml"),
+        (format!("[layout]\nkind = \"density-map\"\npath = {}", "\"".repeat(DEEP)), "recipe.toml"),
     ] {
         gauntlet.recipe(&text, named, true);
     }

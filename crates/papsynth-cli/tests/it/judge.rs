@@ -6,8 +6,7 @@ use std::fs;
 use crate::support::Bench;
 
 /// Small fields that are made quickly and still have nuclei, each of a slide of its own: slides differ by their stain.
-const FIELD: &str =
-    "--set field.width_px=420 --set field.height_px=320 --set field.pixel_um=0.33 --set slide.fields_per_slide=1 --quiet";
+const FIELD: &str = "--set field.width_px=420 --set field.height_px=320 --set field.pixel_um=0.33 --set slide.fields_per_slide=1 --quiet";
 const CELLS: &str = "--set cells.intermediate.count=5 --set cells.superficial.count=2 \
     --set cells.parabasal.count=0 --set cells.metaplastic.count=0";
 

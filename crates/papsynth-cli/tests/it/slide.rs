@@ -29,7 +29,11 @@ fn any_part_of_a_slide_is_made_alone() {
     refused(&bench, "slide tile --at 0,0 --out no.png --set scan.frame_px=9", "scan.frame_px");
     refused(&bench, "slide tile --at 0,0 --out no.png --set layout.kind=band", "layout.kind");
     refused(&bench, "slide tile --at 0,0 --out no.png --set optics.imaging=abbe", "optics.imaging");
-    refused(&bench, "slide tile --at 27000,27000 --out no.png --set scan.max_object_radius_um=20", "scan.max_object_radius_um");
+    refused(
+        &bench,
+        "slide tile --at 27000,27000 --out no.png --set scan.max_object_radius_um=20",
+        "scan.max_object_radius_um",
+    );
     refused(&bench, "slide tile --at 0,0 --size 20,20 --out no.jpg", "ends in .png");
     let planes = bench.good(&format!("slide tile {SMALL} --at 0,0 --size 20,20 --out planes.png --set focus.planes=3"));
     assert!(planes.err.contains("of 3 planes the middle one"), "{}", planes.err);

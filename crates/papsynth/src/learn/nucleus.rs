@@ -1,6 +1,6 @@
 //! Measurements on the image of a nucleus.
 
-use crate::error::{Cause, Flaw};
+use crate::error::{Cause, NucleusError};
 use crate::model::{Donor, OUTSIDE};
 
 /// A point in pixels: x right, y down.
@@ -39,10 +39,10 @@ pub(super) struct NucleusMeasurement {
 impl NucleusImage {
     /// Measures absorbance inside the mask relative to the surroundings of the nucleus (Eq. 11): A = −log₁₀(I₁/I₀).
     pub(super) fn measure(&self) -> Result<NucleusMeasurement, Cause> {
-        self.measured().map_err(|flaw| Cause::Nucleus { name: self.name.clone(), flaw })
+        self.measured().map_err(|cause| Cause::Nucleus { name: self.name.clone(), cause })
     }
 
-    fn measured(&self) -> Result<NucleusMeasurement, Flaw> {
+    fn measured(&self) -> Result<NucleusMeasurement, NucleusError> {
         /// Points of a traced outline.
         const POINTS: usize = 64;
         /// Distance from the outline at which the surroundings begin, beyond the blurred rim of the nucleus, px.
@@ -54,24 +54,24 @@ impl NucleusImage {
         /// Mean absorbance below which a nucleus is indistinguishable from noise.
         const MIN_MEAN: f64 = 0.01;
         if self.width == 0 || self.light.len() != self.mask.len() || !self.light.len().is_multiple_of(self.width) {
-            return Err(Flaw::Size { pixels: self.light.len(), mask: self.mask.len(), width: self.width });
+            return Err(NucleusError::Size { pixels: self.light.len(), mask: self.mask.len(), width: self.width });
         }
         if let Some(bad) = self.light.iter().position(|v| !v.is_finite() || *v < 0.0) {
-            return Err(Flaw::Pixel(bad % self.width, bad / self.width, self.light[bad]));
+            return Err(NucleusError::Pixel(bad % self.width, bad / self.width, self.light[bad]));
         }
-        let outline = outline(&self.mask, self.width, POINTS).map_err(Flaw::Mask)?;
+        let outline = outline(&self.mask, self.width, POINTS).map_err(NucleusError::Mask)?;
         let distance = self.distances(&outline);
         let mut around: Vec<f64> = (0..self.light.len())
             .filter(|&i| self.mask[i] < 0.5 && (SURROUNDINGS_START..SURROUNDINGS_END).contains(&distance[i]))
             .map(|i| f64::from(self.light[i]))
             .collect();
         if around.len() < MIN_PIXELS {
-            return Err(Flaw::Crop(around.len()));
+            return Err(NucleusError::Crop(around.len()));
         }
         around.sort_by(f64::total_cmp);
         let surroundings = around[around.len() / 2];
         if surroundings <= 0.0 {
-            return Err(Flaw::Black);
+            return Err(NucleusError::Black);
         }
         // Eq. 11: A = −log₁₀(I₁/I₀) relative to the surroundings; black pixels count as 1/512 of these.
         let floor = surroundings / 512.0;
@@ -84,11 +84,11 @@ impl NucleusImage {
         let inside: Vec<f64> = absorbance.iter().copied().filter(|a| !a.is_nan()).collect();
         let count = inside.len() as f64;
         if inside.len() < MIN_PIXELS {
-            return Err(Flaw::SmallMask(inside.len(), MIN_PIXELS));
+            return Err(NucleusError::SmallMask(inside.len(), MIN_PIXELS));
         }
         let mean = inside.iter().sum::<f64>() / count;
         if mean < MIN_MEAN {
-            return Err(Flaw::Faint(mean, MIN_MEAN));
+            return Err(NucleusError::Faint(mean, MIN_MEAN));
         }
         let moment = |power: i32| inside.iter().map(|a| libm::pow(a - mean, f64::from(power))).sum::<f64>() / count;
         let sd = moment(2).sqrt();

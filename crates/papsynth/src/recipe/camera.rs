@@ -1,4 +1,4 @@
-//! The section of a recipe about the camera, and cameras that ship.
+//! The camera section of a recipe, and the built-in cameras.
 
 use super::number::{Count, Number};
 use super::section::section;
@@ -6,11 +6,11 @@ use crate::words::words;
 use ccd_noise::{Blooming, CameraParams, ReadNoise};
 
 section! {
-    /// How photons are counted.
+    /// Model of photon noise.
     pub enum PhotonNoise {
-        /// Poisson, exact at every mean.
+        /// Poisson distribution, exact at every mean.
         Exact,
-        /// One normal of the summed variance where more than 400 electrons are expected (skewness below 0.05), Poisson below.
+        /// Normal distribution above a mean of 400 electrons (skewness below 0.05), Poisson distribution below.
         Normal,
         /// No photon noise.
         Off,
@@ -18,84 +18,84 @@ section! {
 }
 
 section! {
-    /// How the sensor's pixels are joined to the picture's.
+    /// Binning mode.
     pub enum Binning {
-        /// Their charges are joined and read once, as in a CCD.
+        /// Charges are summed and read once, as in a CCD.
         Charge,
-        /// They are read one by one and averaged, as in CMOS.
+        /// Pixels are read separately and averaged, as in CMOS.
         Digital,
     }
 }
 
 section! {
-    /// How much of the colour JPEG leaves out.
+    /// Chroma subsampling of a JPEG.
     pub enum Subsampling {
-        /// All colour is kept.
+        /// Full colour resolution.
         #[serde(rename = "4:4:4")]
         S444,
-        /// Every second column of colour is kept.
+        /// Half the columns of colour.
         #[serde(rename = "4:2:2")]
         S422,
-        /// Every second column and row of colour is kept.
+        /// Half the columns and half the rows of colour.
         #[serde(rename = "4:2:0")]
         S420,
     }
 }
 
 section! {
-    /// The camera (Eq. 13, g_po and g_g): the linear model of EMVA 1288. Numbers are those of one pixel of the sensor.
-    pub struct Camera, drawn as pub SceneCamera {
-        /// Side of a pixel of the sensor; `field.magnification` makes it the picture's.
+    /// Camera (Eq. 13, g_po and g_g): the linear model of EMVA 1288. Values apply to one pixel of the sensor.
+    pub struct CameraSection, drawn as pub SceneCamera {
+        /// Pixel size of the sensor. Used if `field.magnification` is given.
         pixel_um: Number (undrawn) = 6.45, 1..=100, "µm";
-        /// Bits of a grey level.
+        /// Bit depth of grey levels.
         bits: Count = 8, 8..=16;
-        /// Electrons that a pixel holds, which the largest grey level stands for.
+        /// Full-well capacity, which corresponds to the largest grey level.
         full_well_e: Number = 32_600.0, 10..=10000000;
-        /// Standard deviation of the read noise; where pixels differ, its median.
+        /// Standard deviation of the read noise. If pixels differ, its median over pixels.
         read_noise_e: Number = 138.0, 0..=100000, "electrons";
-        /// Root of the mean square of the read noises of pixels that differ, as in CMOS: from `read_noise_e` to 20 times
-        /// that. 0 where all pixels are alike.
+        /// Root mean square of the read noise over pixels, for pixels that differ as in CMOS: `read_noise_e` to 20 times that
+        /// value. 0 if all pixels have the same read noise.
         read_noise_rms_e: Number = 0.0, 0..=100000, "electrons";
         /// Grey level of a dark pixel.
         offset_dn: Number = 0.0, 0..=4096;
-        /// Glare that was taken off the picture as its black level, as a share of the light of the empty slide: what is
-        /// dark keeps the noise of the glare.
+        /// Fraction of the light of the empty slide that is glare and was subtracted from the image as its black level. The
+        /// noise of the glare remains.
         glare_subtracted: Number = 0.0, 0..=0.8;
-        /// How photons are counted.
+        /// Model of photon noise.
         photon_noise: PhotonNoise = PhotonNoise::Exact;
-        /// Photo response non-uniformity: spread of the pixels' responses as a share of their mean.
+        /// Photo response non-uniformity: standard deviation of the pixels' responses, relative to their mean.
         prnu: Number = 0.007, 0..=0.5;
-        /// Dark signal non-uniformity: spread of the pixels' offsets.
+        /// Dark signal non-uniformity: standard deviation of the pixels' offsets.
         dsnu_e: Number = 2.0, 0..=100000, "electrons";
-        /// Which camera of its kind it is: its fixed pattern is the same in all images.
+        /// Serial number of the camera, the seed of its fixed-pattern noise. All images have the same pattern.
         serial: u64 = 1, 0..=9007199254740992.0;
-        /// Exposure: how long dark current is gathered. Light is what `background.level` says.
+        /// Exposure time, over which dark current accumulates. The light is given by `background.level`.
         exposure_s: Number = 0.02, 0..=1000000, "seconds";
-        /// Dark current at `dark_reference_c`.
+        /// Dark current at the temperature `dark_reference_c`.
         dark_current_e_per_s: Number = 1.0, 0..=1000000, "electrons per second and pixel";
-        /// Temperature for which the dark current is given.
+        /// Reference temperature of the dark current.
         dark_reference_c: Number = 25.0, -200..=150, "°C";
         /// Temperature of the sensor.
         temperature_c: Number = 25.0, -200..=150, "°C";
-        /// Warming that doubles the dark current.
+        /// Temperature difference that doubles the dark current.
         dark_doubling_c: Number = 8.0, 0.1..=100, "K";
-        /// Share of the charge that a full pixel cannot hold and that blooms into its neighbours; the rest is drained.
+        /// Fraction of excess charge that blooms into neighbouring pixels. The rest is drained.
         blooming: Number = 0.0, 0..=1;
-        /// Share of that which stays within its column.
+        /// Fraction of the blooming charge that stays in its column.
         blooming_vertical: Number = 0.95, 0..=1;
-        /// Pixels of the sensor along the side of one of the picture.
+        /// Binning factor: pixels of the sensor along the side of an image pixel.
         binning_px: Count = 1, 1..=8;
-        /// How they are joined.
+        /// Binning mode.
         binning: Binning = Binning::Charge;
-        /// Quality of a JPEG through which the picture has gone, or 0 for none; 8 bits only.
+        /// JPEG quality, or 0 for no JPEG compression. For 8 bits only.
         jpeg_quality: Count = 0, 0..=100;
-        /// How much of the colour that leaves out.
+        /// Chroma subsampling of the JPEG.
         jpeg_subsampling: Subsampling = Subsampling::S420;
     }
 }
 
 words! {
-    /// A named camera.
+    /// A built-in camera.
     pub enum CameraPreset {
         /// The paper's simulator: 8 bits, 70 electrons a grey level, read noise of one grey level.
         Paper = "paper",
@@ -107,7 +107,7 @@ words! {
 }
 
 impl CameraPreset {
-    /// What it is, in a line.
+    /// Returns a description in one line.
     #[must_use]
     pub fn summary(self) -> &'static str {
         match self {
@@ -117,20 +117,20 @@ impl CameraPreset {
         }
     }
 
-    /// The camera; where its numbers come from, `ccd_noise::CameraParams` says.
+    /// Returns the camera. The sources of its values are documented in `ccd_noise::CameraParams`.
     #[must_use]
-    pub fn camera(self) -> Camera {
+    pub fn camera(self) -> CameraSection {
         let (pixel_um, params) = match self {
             Self::Paper => (6.45, CameraParams::paper()),
             Self::Orca05g => (6.45, CameraParams::orca_05g()),
             Self::Scmos => (6.5, CameraParams::scmos()),
         };
-        Camera { pixel_um: pixel_um.into(), ..Camera::of(&params) }
+        CameraSection { pixel_um: pixel_um.into(), ..CameraSection::of(&params) }
     }
 }
 
-impl Camera {
-    /// The section that stands for a camera.
+impl CameraSection {
+    /// Returns the section of a recipe that describes a camera.
     #[must_use]
     pub fn of(params: &CameraParams) -> Self {
         let largest = libm::exp2(f64::from(params.bit_depth)) - 1.0;
@@ -142,7 +142,7 @@ impl Camera {
             Blooming::Off => (0.0, 0.95),
             Blooming::On { vertical, anti_blooming } => (1.0 - anti_blooming, vertical),
         };
-        // To six digits: what a camera is known to, and what a recipe is read with.
+        // Recipes give values to six digits.
         let number = |value: f64| {
             let scale = libm::pow(10.0, 6.0 - libm::ceil(libm::log10(value.abs().max(1e-300))));
             Number::Fixed(if value == 0.0 { 0.0 } else { libm::round(value * scale) / scale })

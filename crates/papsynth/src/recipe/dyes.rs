@@ -3,9 +3,8 @@
 use super::section::section;
 
 section! {
-    /// Amounts of dyes in what is stained with strength 1, each as the absorbance at the dye's own peak. The strength of
-    /// the stain is what the model and the factors of this section say: the absorbance at 0.57 µm where the amounts are
-    /// such that their absorbances add up to 1 there.
+    /// Amounts of dyes at staining strength 1, each as the absorbance at the peak of the dye. The staining strength is given by the
+    /// model and the factors of `stain`. It is the absorbance at 0.57 µm if the absorbances of the amounts add up to 1 there.
     #[derive(Copy)]
     pub struct DyeAmounts {
         /// Haematein bound to aluminium, blue-violet, peak near 0.58 µm.
@@ -16,25 +15,25 @@ section! {
         light_green: f64 = 0.0, 0..=100;
         /// Orange G, orange, peak near 0.48 µm.
         orange_g: f64 = 0.0, 0..=100;
-        /// Something grey that absorbs all light alike.
+        /// A grey absorber, the same at all wavelengths.
         neutral: f64 = 0.0, 0..=100;
     }
 }
 
 impl DyeAmounts {
-    /// No dye at all.
+    /// Returns no dye.
     #[must_use]
     pub fn none() -> Self {
         Self::default()
     }
 
-    /// Grey of strength 1.
+    /// Returns grey of strength 1.
     #[must_use]
     pub fn grey() -> Self {
         Self { neutral: 1.0, ..Self::none() }
     }
 
-    /// In the order of [`dye_spectra::Dye::ALL`].
+    /// Returns the amounts in the order of [`dye_spectra::Dye::ALL`].
     #[must_use]
     pub fn amounts(&self) -> dye_spectra::Amounts {
         [self.haematein, self.eosin_y, self.light_green, self.orange_g, self.neutral]

@@ -1,106 +1,106 @@
-//! Sections of a recipe about the microscope: field, focus, background, light, optics.
+//! The sections of a recipe about the microscope: field, focus, background, light, optics.
 
 use super::number::{Count, Number};
 use super::section::section;
 
 section! {
-    /// The image: its size and the size of its pixels. Densities of cells and debris apply to its
-    /// area; objects of a density also lie in a margin of 60 µm round it, from which they reach into the image.
+    /// Image: its size and its pixel size. Densities of cells and debris apply to its
+    /// area. Objects of a density also have centres in a margin of 60 µm around it, so that they reach into the image.
     pub struct Field {
-        /// Width; drawn once a field.
+        /// Width of the image. Drawn once a field.
         width_px: Count = 1376, 16..=32768, "pixels";
-        /// Height; drawn once a field.
+        /// Height of the image. Drawn once a field.
         height_px: Count = 1038, 16..=32768, "pixels";
-        /// Size of a pixel in the object (the paper's: 0.25). Not looked at where `magnification` is given.
+        /// Pixel size in the object (the paper: 0.25). Ignored if `magnification` is above 0.
         pixel_um: Number = 0.25, 0.05..=4, "µm";
-        /// Magnification between slide and sensor, relay optics included, or 0 if `pixel_um` says it all. A pixel is then
-        /// `camera.pixel_um` times `camera.binning_px`, divided by this: 6.45 µm at 40 · 0.645 are 0.25 µm.
+        /// Magnification from slide to sensor, including relay optics, or 0 to use `pixel_um`. The pixel size is
+        /// `camera.pixel_um` times `camera.binning_px`, divided by the magnification: 6.45 µm at 40 · 0.645 give 0.25 µm.
         magnification: Number = 0.0, 0..=400;
     }
 }
 
 section! {
-    /// Focal planes. A plane is where the stage stands; what is in focus there lies deeper or higher by the ratio of the two
-    /// indices of refraction, if the optics know them.
+    /// Focal planes, as positions of the stage. With bright-field optics, the depth in focus is the position of the stage times the
+    /// ratio of the refractive indices of mountant and immersion.
     pub struct Focus, drawn as pub(crate) DrawnFocus {
-        /// Number of focal planes: 1 is an image, more are a focus stack.
+        /// Number of focal planes. 1 gives an image, more give a focus stack.
         planes: Count = 1, 1..=1024;
-        /// Travel of the stage between planes.
+        /// Distance between planes, as travel of the stage.
         step_um: Number = 0.5, 0.001..=100, "µm";
-        /// Travel of the stage to the middle plane; at 0 the middle of the slide is in focus, at more what lies nearer
-        /// to the objective.
+        /// Position of the stage at the central plane. At 0 the centre of the slide is in focus; larger values focus nearer to the
+        /// objective.
         centre_um: Number = 0.0, -100..=100, "µm";
-        /// What becomes of the planes.
+        /// Output of the planes.
         output: FocusOutput = FocusOutput::Planes;
-        /// How much of its noise a fused picture shares with the next pixel of the row.
+        /// Correlation of the noise of neighbouring pixels of a row, in an EDF image.
         noise_correlation_x: Number = 0.2, 0..=0.5;
-        /// The same with the next pixel of the column.
+        /// Correlation of the noise of neighbouring pixels of a column, in an EDF image.
         noise_correlation_y: Number = 0.4, 0..=0.5;
-        /// How much more it shares with the next pixel down to the right than with that down to the left (half of the
-        /// difference): pictures that were turned or shifted by parts of a pixel have some.
+        /// Half the difference between the correlations of the noise along the two diagonals (down right minus down left), in an
+        /// EDF image. Images that were rotated or shifted by fractions of a pixel have such a difference.
         noise_correlation_diagonal: Number = 0.0, -0.1..=0.1;
     }
 }
 
 section! {
-    /// What becomes of the planes of a focus stack.
+    /// Output of the planes of a focus stack.
     pub enum FocusOutput {
-        /// Each is a picture.
+        /// One image per plane.
         Planes,
-        /// They are fused to one picture of extended focus: everything as the plane that shows it sharpest, with noise that
-        /// neighbouring pixels share.
+        /// One image of extended depth of field (EDF): each object as in its sharpest plane, with noise that is correlated between
+        /// neighbouring pixels.
         Edf,
     }
 }
 
 section! {
-    /// How evenly the lamp lights the field.
+    /// Illumination of the field.
     pub enum Illumination, by default Quadratic {
-        /// The paper's: distance to the image's border to the power of an exponent (Eq. 8).
+        /// The paper's model: a power of the distance to the image border (Eq. 8).
         Border(Border),
-        /// A smooth bowl, 1 − x2·x² − y2·y² over −1..1, as measured on real fields.
+        /// A quadratic falloff, 1 − falloff_x·x² − falloff_y·y² over −1..1, as measured on real fields.
         Quadratic(Quadratic),
     }
 }
 
 section! {
-    /// The paper's light: distance to the image's border to the power of an exponent (Eq. 8).
+    /// The paper's illumination: a power of the distance to the image border (Eq. 8).
     pub struct Border {
-        /// The exponent n: 0 is even; the released value is 0.02.
+        /// Exponent n of the distance. 0 gives even illumination; the released value is 0.02.
         exponent: Number = 0.02, 0..=2;
     }
 }
 
 section! {
-    /// A smooth bowl of light, 1 − x2·x² − y2·y² over −1..1, as measured on real fields.
+    /// A quadratic falloff of the illumination, 1 − falloff_x·x² − falloff_y·y² over −1..1, as measured on real fields.
     pub struct Quadratic {
-        /// Fall towards the left and right border, as a fraction of the centre.
+        /// Falloff at the left and right border, as a fraction of the maximum.
         falloff_x: Number = Number::uniform(0.01, 0.055), 0..=0.45;
-        /// Fall towards the upper and lower border, as a fraction of the centre.
+        /// Falloff at the upper and lower border, as a fraction of the maximum.
         falloff_y: Number = Number::uniform(0.0, 0.025), 0..=0.45;
-        /// Where the top of the bowl lies, as a fraction of half the field to either side.
+        /// Distance of the maximum from the centre of the field, as a fraction of half the field.
         centre_offset: Number = Number::uniform(0.0, 0.25), 0..=0.9;
     }
 }
 
 section! {
-    /// The empty slide, as the lamp shows it (Eqs. 8–10).
+    /// Light of the empty slide (Eqs. 8–10).
     pub struct Background {
-        /// Light of the empty slide as a fraction of the camera's largest grey level (b of Eq. 8).
+        /// Level of the empty slide, as a fraction of the largest grey level (b of Eq. 8).
         level: Number = Number::normal(0.90, 0.055).at_least(0.74).at_most(0.985), 0.01..=1.2;
-        /// How evenly the lamp lights the field.
+        /// Illumination of the field.
         illumination: Illumination;
-        /// Strength of Perlin noise in the light, as a fraction of the largest grey level (c_pe of Eq. 9).
+        /// Amplitude of the Perlin noise of the background, as a fraction of the largest grey level (c_pe of Eq. 9).
         texture: Number = Number::uniform(0.015, 0.045), 0..=0.5;
-        /// Size of the cells of that noise.
+        /// Cell size of the Perlin noise of the background.
         texture_um: Number = 60.0, 1..=10000, "µm";
     }
 }
 
 section! {
-    /// The light: one wavelength or three colours.
-    pub enum Light, by default Monochrome {
-        /// A grey image in the light of one interference filter.
+    /// Light: monochrome or colour.
+    pub enum LightSection, by default Monochrome {
+        /// A grey image in the light of an interference filter.
         Monochrome(Monochrome),
         /// A colour image: halogen lamp, colour camera, white balance on the empty slide.
         Colour(Colour),
@@ -110,59 +110,59 @@ section! {
 section! {
     /// The light of one interference filter.
     pub struct Monochrome {
-        /// Wavelength (the paper's: 0.57, where nuclei stand out most).
+        /// Wavelength of the filter (the paper: 0.57, the highest contrast of nuclei).
         wavelength_um: Number = 0.57, 0.4..=0.7, "µm";
-        /// Width of the filter's band.
+        /// Bandwidth of the filter.
         bandwidth_um: Number = 0.01, 0..=0.1, "µm";
     }
 }
 
 section! {
-    /// Colours: halogen lamp, colour camera, white balance on the empty slide.
+    /// Colour: halogen lamp, colour camera, white balance on the empty slide.
     pub struct Colour {
-        /// Temperature of the lamp.
+        /// Colour temperature of the lamp.
         lamp_k: Number = 3200.0, 2000..=10000, "K";
-        /// How dyes make colours.
+        /// Colour model of the dyes.
         mixing: Mixing = Mixing::Spectral;
-        /// How much farther from the objective red light (0.65 µm) comes to focus than green (0.55 µm); what an apochromat
-        /// leaves is below one.
+        /// Longitudinal chromatic aberration: distance of the focus of red light (0.65 µm) beyond that of green light (0.55 µm).
+        /// Below 1 for an apochromat.
         chromatic_um: Number = 0.3, -10..=10, "µm of stage travel";
-        /// How the camera's colours are written.
+        /// Colour rendition of the camera.
         rendition: Rendition = Rendition::Display;
     }
 }
 
 section! {
-    /// How dyes make colours.
+    /// Colour model of the dyes.
     pub enum Mixing {
-        /// Beer and Lambert's law at sixteen wavelengths, averaged over the band of each channel.
+        /// Beer–Lambert law at sixteen wavelengths, averaged over the band of each channel.
         Spectral,
-        /// One absorbance for each dye and channel: faster; dark stains turn out too dark.
+        /// One absorbance per dye and channel. Faster; dark stains become too dark.
         ThreeVectors,
-        /// Sixteen wavelengths, each imaged by itself: the reference for the others, and several times as slow.
+        /// Sixteen wavelengths, each imaged separately. The reference for the other models; several times slower.
         PerWavelength,
     }
 }
 
 section! {
-    /// How the camera's colours are written.
+    /// Colour rendition of the camera.
     pub enum Rendition {
-        /// The three channels of the sensor, balanced and in proportion to the light: for measuring.
+        /// The three channels of the sensor, white-balanced and linear, for measurements.
         Raw,
-        /// The same three channels, balanced, under the tone curve of sRGB: what most microscope cameras save.
+        /// The three channels of the sensor, white-balanced, with the tone curve of sRGB, as most microscope cameras save them.
         Display,
-        /// Colours as an eye would see them: sRGB primaries and tone curve.
+        /// Colorimetric colours: sRGB primaries and tone curve.
         Srgb,
     }
 }
 
 section! {
-    /// How light spreads between slide and sensor.
-    #[expect(clippy::large_enum_variant, reason = "one a recipe")]
+    /// Optics between slide and sensor.
+    #[expect(clippy::large_enum_variant, reason = "a recipe has one value of it")]
     pub enum Optics, by default BrightField {
-        /// Partially coherent bright field: what every slab transmits, filtered by the weak-object transfer function.
+        /// Partially coherent bright field: the transmission of each slab, filtered by the weak-object transfer function.
         BrightField(Microscope),
-        /// The paper's: Gaussians on the absorbance (Eqs. 13, 14, Fig. 10).
+        /// The paper's model: Gaussian blur of the absorbance (Eqs. 13, 14, Fig. 10).
         Gaussian(Gaussians),
     }
 }
@@ -172,62 +172,62 @@ section! {
     pub struct Microscope, drawn as pub SceneMicroscope {
         /// Numerical aperture of the objective, at most `immersion_index` and below `mount_index`.
         na: Number = 0.95, 0.05..=1.6;
-        /// Numerical aperture to which the condenser is opened, below `mount_index`; what exceeds `na` is lost light. 0.41
-        /// gives 0.25 µm of blur for each µm of stage travel, the paper's Fig. 10.
+        /// Numerical aperture of the condenser, below `mount_index`. Light beyond `na` is lost. 0.41 gives 0.25 µm of blur per µm
+        /// of stage travel, as in the paper's Fig. 10.
         condenser_na: Number = 0.41, 0.05..=1.6;
-        /// Refractive index of the mountant in which the cells lie.
+        /// Refractive index of the mountant.
         mount_index: Number = 1.515, 1..=2;
-        /// Refractive index between cover glass and objective: 1 for a dry lens.
+        /// Refractive index between cover glass and objective. 1 for a dry lens.
         immersion_index: Number = 1.0, 1..=2;
-        /// How much thicker the cover glass is than the lens was made for.
+        /// Thickness error of the cover glass: its thickness minus the design thickness of the objective.
         cover_error_um: Number = 0.0, -50..=50, "µm";
-        /// Spherical aberration of the objective (root mean square).
+        /// Spherical aberration of the objective, root mean square.
         spherical: Number = 0.0, -1..=1, "waves";
-        /// Coma along the rows (root mean square).
+        /// Coma along the rows, root mean square.
         coma: Number = 0.0, -1..=1, "waves";
-        /// Astigmatism between rows and columns (root mean square).
+        /// Astigmatism between rows and columns, root mean square.
         astigmatism: Number = 0.0, -1..=1, "waves";
-        /// Standard deviation of further spread: relay optics, charge diffusion, vibration. 0.16 makes edges as wide as the
-        /// paper measured them, 0.9 px.
+        /// Standard deviation of additional blur: relay optics, charge diffusion, vibration. 0.16 gives the edge width measured in
+        /// the paper, 0.9 px.
         extra_blur_um: Number = 0.16, 0..=10, "µm";
-        /// Share of an empty field's light that lies evenly over the picture: glare.
+        /// Fraction of the light of an empty field that is evenly distributed stray light (glare).
         stray_light: Number = Number::uniform(0.01, 0.04), 0..=0.5;
-        /// Samples of the slide along the side of a pixel.
+        /// Oversampling: samples of the slide along the side of a pixel.
         oversampling: Count = 2, 1..=4;
-        /// How light is followed through the slide.
+        /// Imaging model.
         imaging: Imaging (last) = Imaging::Product;
-        /// Thickness of the slabs between which `abbe` carries light; `product` knows every depth.
+        /// Thickness of the slabs of `abbe`. `product` uses the exact depth of each object.
         slab_um: Number = 0.25, 0.1..=10, "µm";
-        /// Directions of light that `abbe` follows.
+        /// Number of illumination directions of `abbe`.
         directions: Count (last) = 64, 1..=65536;
     }
 }
 
 section! {
-    /// The paper's spread of light: Gaussians on the absorbance (Eqs. 13, 14, Fig. 10).
+    /// The paper's optics: Gaussian blur of the absorbance (Eqs. 13, 14, Fig. 10).
     pub struct Gaussians {
-        /// Standard deviation of the spread in the image plane (the paper's: 0.9 px of 0.25 µm).
+        /// Standard deviation of the blur in focus (the paper: 0.9 px of 0.25 µm).
         sigma_xy_um: Number = 0.225, 0..=20, "µm";
-        /// Growth of the spread with distance from focus. The paper's calibration is 0.25, that is one pixel of 0.25 µm per
-        /// µm; its sentence read as "µm per µm" would be 1.
+        /// Increase of the blur with distance from focus. The paper's calibration is 0.25, one pixel of 0.25 µm per µm; its
+        /// sentence read as "µm per µm" gives 1.
         sigma_z_um_per_um: Number = 0.25, 0..=10, "µm per µm";
     }
 }
 
 section! {
-    /// How light is followed through the slide.
+    /// Imaging model of bright-field optics.
     pub enum Imaging {
-        /// The product over all objects of what each transmits, filtered by the weak-object transfer function: right to
-        /// one or two per cent of the contrast.
+        /// The product of the transmissions of all objects, each filtered by the weak-object transfer function. Accurate to one or
+        /// two per cent of the contrast.
         Product,
-        /// Abbe's integration over the source, light carried from slab to slab: the reference, thousands of times as slow and for
+        /// Abbe's integration over the source, with propagation from slab to slab. The reference, thousands of times slower, for
         /// small fields.
         Abbe,
     }
 }
 
 impl Optics {
-    /// The paper's Gaussians.
+    /// Returns the paper's optics.
     #[must_use]
     pub fn gaussian() -> Self {
         Self::Gaussian(Gaussians::default())

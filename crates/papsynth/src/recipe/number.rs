@@ -9,41 +9,41 @@ use serde::{Deserialize, Serialize};
 
 use crate::random;
 
-/// How many standard deviations a normal or log-normal reaches to either side of its middle.
+/// Number of standard deviations at which normal and log-normal distributions are cut on both sides.
 ///
-/// Every distribution of a recipe is bounded, so that a recipe can be checked before anything is drawn.
+/// All distributions are bounded, so that a recipe can be checked before anything is drawn.
 pub const REACH_SD: f64 = 4.0;
 
 /// A number of a recipe.
 ///
 /// ```toml
-/// count = 30                                    # always 30
-/// count = { uniform = [20, 40] }                # anything from 20 to 40
+/// depth = 3                                     # always 3
+/// depth = { uniform = [2, 4] }                  # uniform from 2 to 4
 /// size  = { normal = [1.0, 0.1] }               # mean, standard deviation
 /// stain = { log_normal = [1.0, 0.44] }          # median, standard deviation of the logarithm
-/// depth = { choice = [2, 4, 8] }                # one of these
+/// depth = { choice = [2, 4, 8] }                # one of these values
 /// size  = { normal = [1.0, 0.3], min = 0.5 }    # cut off below (or above, with max)
 /// ```
 ///
-/// Normal and log-normal are cut at 4 standard deviations to either side.
+/// Normal and log-normal distributions are cut at 4 standard deviations.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Number {
-    /// Always this value.
+    /// A fixed value.
     Fixed(f64),
-    /// One of a family, cut to `min..=max`.
+    /// A distribution, cut to `min..=max`.
     Drawn {
-        /// The family.
-        law: Law,
-        /// Nothing below this is drawn.
+        /// The distribution.
+        distribution: Distribution,
+        /// Smallest value.
         min: f64,
-        /// Nothing above this is drawn.
+        /// Largest value.
         max: f64,
     },
 }
 
-/// The families of distributions a recipe knows.
+/// A distribution of a recipe.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Law {
+pub enum Distribution {
     /// Uniform between two values.
     Uniform(f64, f64),
     /// Normal with a mean and a standard deviation.
@@ -54,7 +54,7 @@ pub enum Law {
     Choice(Vec<f64>),
 }
 
-/// A number of things: a value that is written out must be whole, one that is drawn from a range is rounded.
+/// A count. A fixed value and the values of `choice` must be integers; values of other distributions are rounded.
 pub type Count = Number;
 
 impl From<f64> for Number {
@@ -70,59 +70,59 @@ impl From<i32> for Number {
 }
 
 impl Number {
-    /// Uniform between `low` and `high`.
+    /// Returns a uniform distribution between `low` and `high`.
     #[must_use]
     pub fn uniform(low: f64, high: f64) -> Self {
-        Self::law(Law::Uniform(low, high))
+        Self::drawn(Distribution::Uniform(low, high))
     }
 
-    /// Normal with a mean and a standard deviation, cut at 4 of them.
+    /// Returns a normal distribution with a mean and a standard deviation, cut at 4 standard deviations.
     #[must_use]
     pub fn normal(mean: f64, sd: f64) -> Self {
-        Self::law(Law::Normal(mean, sd))
+        Self::drawn(Distribution::Normal(mean, sd))
     }
 
-    /// Log-normal with a median and the standard deviation of the logarithm, cut at 4 of them.
+    /// Returns a log-normal distribution with a median and the standard deviation of the logarithm, cut at 4 standard deviations.
     #[must_use]
     pub fn log_normal(median: f64, log_sd: f64) -> Self {
-        Self::law(Law::LogNormal(median, log_sd))
+        Self::drawn(Distribution::LogNormal(median, log_sd))
     }
 
-    /// One of these values, all equally likely.
+    /// Returns a distribution of equally likely values.
     #[must_use]
     pub fn choice(values: impl Into<Vec<f64>>) -> Self {
-        Self::law(Law::Choice(values.into()))
+        Self::drawn(Distribution::Choice(values.into()))
     }
 
-    fn law(law: Law) -> Self {
-        Self::Drawn { law, min: f64::NEG_INFINITY, max: f64::INFINITY }
+    fn drawn(distribution: Distribution) -> Self {
+        Self::Drawn { distribution, min: f64::NEG_INFINITY, max: f64::INFINITY }
     }
 
-    /// Cuts the number below, and moves it by whole standard deviations no further than that.
+    /// Returns the number, cut below `floor`.
     #[must_use]
     pub fn at_least(self, floor: f64) -> Self {
         match self {
-            Self::Drawn { law, min, max } => Self::Drawn { law, min: min.max(floor), max },
+            Self::Drawn { distribution, min, max } => Self::Drawn { distribution, min: min.max(floor), max },
             Self::Fixed(value) => Self::Fixed(value.max(floor)),
         }
     }
 
-    /// Cuts the number above.
+    /// Returns the number, cut above `ceiling`.
     #[must_use]
     pub fn at_most(self, ceiling: f64) -> Self {
         match self {
-            Self::Drawn { law, min, max } => Self::Drawn { law, min, max: max.min(ceiling) },
+            Self::Drawn { distribution, min, max } => Self::Drawn { distribution, min, max: max.min(ceiling) },
             Self::Fixed(value) => Self::Fixed(value.min(ceiling)),
         }
     }
 
-    /// The smallest and the largest value that can be drawn.
+    /// Returns the smallest and the largest value that can be drawn.
     #[must_use]
     pub fn bounds(&self) -> [f64; 2] {
         match self {
             Self::Fixed(value) => [*value, *value],
-            Self::Drawn { law, min, max } => {
-                let [low, high] = law.bounds();
+            Self::Drawn { distribution, min, max } => {
+                let [low, high] = distribution.bounds();
                 [low.max(*min), high.min(*max)]
             }
         }
@@ -130,15 +130,14 @@ impl Number {
 
     /// Draws a value.
     pub fn draw<R: Rng + ?Sized>(&self, rng: &mut R) -> f64 {
-        /// Tries before a cut-off tail is left to the uniform law between its bounds: reached only when nearly
-        /// the whole distribution is cut off.
+        /// Tries before the value is drawn uniformly between the bounds, if nearly the complete distribution is cut off.
         const TRIES: usize = 1000;
         match self {
             Self::Fixed(value) => *value,
-            Self::Drawn { law, .. } => {
+            Self::Drawn { distribution, .. } => {
                 let [low, high] = self.bounds();
                 for _ in 0..TRIES {
-                    let value = law.draw(rng);
+                    let value = distribution.draw(rng);
                     if (low..=high).contains(&value) {
                         return value;
                     }
@@ -168,38 +167,37 @@ impl Number {
     fn mean_of(&self, of: impl Fn(f64) -> f64) -> f64 {
         /// Points of the midpoint rule over the bounds.
         const POINTS: u32 = 4096;
-        let Self::Drawn { law, .. } = self else { return of(self.bounds()[0]) };
+        let Self::Drawn { distribution, .. } = self else { return of(self.bounds()[0]) };
         let [low, high] = self.bounds();
         let is_within = |value: &&f64| (low..=high).contains(*value);
-        if let Law::Choice(values) = law {
+        if let Distribution::Choice(values) = distribution {
             let kept: Vec<f64> = values.iter().filter(is_within).map(|value| of(*value)).collect();
             return kept.iter().sum::<f64>() / kept.len().max(1) as f64;
         }
-        let [from, to] = [law.scaled(low), law.scaled(high)];
+        let [from, to] = [distribution.scaled(low), distribution.scaled(high)];
         let points = (0..POINTS).map(|i| from + (to - from) * (f64::from(i) + 0.5) / f64::from(POINTS));
         let (sum, weights) = points.fold((0.0, 0.0), |(sum, weights), x| {
-            let (value, weight) = law.at(x);
+            let (value, weight) = distribution.at(x);
             (sum + weight * of(value), weights + weight)
         });
         if weights > 0.0 { sum / weights } else { of(0.5 * (low + high)) }
     }
 
-    /// What is wrong with this number where something is counted: what is written out must be whole, what is drawn from a
-    /// range is rounded.
+    /// Returns a message if the number is not a valid [`Count`].
     pub(crate) fn fraction(&self) -> Option<String> {
         let written: &[f64] = match self {
             Self::Fixed(value) => &[*value],
-            Self::Drawn { law: Law::Choice(values), .. } => values,
+            Self::Drawn { distribution: Distribution::Choice(values), .. } => values,
             Self::Drawn { .. } => &[],
         };
         let value = written.iter().find(|value| value.is_finite() && value.floor() != **value)?;
-        Some(format!("{value} is not a whole number"))
+        Some(format!("{value} is not an integer"))
     }
 
-    /// What is wrong with this number, if it must lie within `low..=high`.
+    /// Returns a message if the number is invalid or not within `low..=high`.
     pub(crate) fn problem(&self, low: f64, high: f64) -> Option<String> {
-        if let Self::Drawn { law, min, max } = self {
-            if let Some(problem) = law.problem() {
+        if let Self::Drawn { distribution, min, max } = self {
+            if let Some(problem) = distribution.problem() {
                 return Some(problem);
             }
             if min.is_nan() || max.is_nan() {
@@ -208,14 +206,14 @@ impl Number {
         }
         let [least, most] = self.bounds();
         if !least.is_finite() || !most.is_finite() {
-            return Some(format!("{self} is not a finite number; expected {}", range(low, high)));
+            return Some(format!("{self} is not finite: expected {}", range(low, high)));
         }
         if least > most {
-            return Some(format!("{self} leaves nothing to draw between `min` and `max`"));
+            return Some(format!("{self} has no value between `min` and `max`"));
         }
         if least < low || most > high {
-            let reach = if least < most { format!(", which reaches from {least} to {most}") } else { String::new() };
-            return Some(format!("{self}{reach} is outside {}", range(low, high)));
+            let reach = if least < most { format!(" (from {least} to {most})") } else { String::new() };
+            return Some(format!("{self}{reach} is out of range: expected {}", range(low, high)));
         }
         None
     }
@@ -225,7 +223,7 @@ fn range(low: f64, high: f64) -> String {
     format!("{low} to {high}")
 }
 
-impl Law {
+impl Distribution {
     fn bounds(&self) -> [f64; 2] {
         match self {
             Self::Uniform(low, high) => [*low, *high],
@@ -249,7 +247,7 @@ impl Law {
         }
     }
 
-    /// Returns the value on the scale on which [`Law::at`] is uniform or normal: standard deviations from the centre.
+    /// Returns the value on the scale on which [`Distribution::at`] is uniform or normal: standard deviations from the centre.
     fn scaled(&self, value: f64) -> f64 {
         match self {
             Self::Normal(mean, sd) if *sd > 0.0 => (value - mean) / sd,
@@ -273,19 +271,21 @@ impl Law {
         let number = |value: &f64| value.is_finite();
         match self {
             Self::Uniform(low, high) if !number(low) || !number(high) => {
-                Some("`uniform` needs two finite numbers".to_owned())
+                Some("expected two finite numbers in `uniform`".to_owned())
             }
             Self::Uniform(low, high) if low > high => {
-                Some(format!("`uniform = [{low}, {high}]` has its ends swapped; write [{high}, {low}]"))
+                Some(format!("`uniform = [{low}, {high}]` has its bounds swapped: expected [{high}, {low}]"))
             }
-            Self::Normal(mean, sd) if !number(mean) || !number(sd) || *sd < 0.0 => {
-                Some(format!("`normal = [{mean}, {sd}]` needs a finite mean and a standard deviation of 0 or more"))
-            }
+            Self::Normal(mean, sd) if !number(mean) || !number(sd) || *sd < 0.0 => Some(format!(
+                "`normal = [{mean}, {sd}]`: expected a finite mean and a standard deviation of at least 0"
+            )),
             Self::LogNormal(median, sd) if !number(median) || *median <= 0.0 || !number(sd) || *sd < 0.0 => {
-                Some(format!("`log_normal = [{median}, {sd}]` needs a median above 0 and a deviation of 0 or more"))
+                Some(format!(
+                    "`log_normal = [{median}, {sd}]`: expected a median above 0 and a standard deviation of at least 0"
+                ))
             }
             Self::Choice(values) if values.is_empty() || values.iter().any(|v| !v.is_finite()) => {
-                Some("`choice` needs at least one number, all of them finite".to_owned())
+                Some("expected at least one number in `choice`, and finite numbers".to_owned())
             }
             _ => None,
         }
@@ -312,8 +312,8 @@ impl fmt::Display for Number {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Fixed(value) => write!(f, "{value}"),
-            Self::Drawn { law, min, max } => {
-                write!(f, "{{ {} = {:?}", law.name(), law.values())?;
+            Self::Drawn { distribution, min, max } => {
+                write!(f, "{{ {} = {:?}", distribution.name(), distribution.values())?;
                 if min.is_finite() {
                     write!(f, ", min = {min}")?;
                 }
@@ -330,9 +330,9 @@ impl Serialize for Number {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Self::Fixed(value) => serialize_plain(*value, serializer),
-            Self::Drawn { law, min, max } => {
+            Self::Drawn { distribution, min, max } => {
                 let mut map = serializer.serialize_map(None)?;
-                map.serialize_entry(law.name(), &law.values())?;
+                map.serialize_entry(distribution.name(), &distribution.values())?;
                 if min.is_finite() {
                     map.serialize_entry("min", min)?;
                 }
@@ -345,12 +345,12 @@ impl Serialize for Number {
     }
 }
 
-/// Whole numbers print without a fraction: `planes = 21`, not `21.0`.
+/// Writes integers without a fraction: `planes = 21`, not `21.0`.
 fn serialize_plain<S: Serializer>(value: f64, serializer: S) -> Result<S::Ok, S::Error> {
-    /// Whole numbers up to 2⁵³ are exact in f64.
+    /// Integers up to 2⁵³ are exact in f64.
     const EXACT: f64 = 9_007_199_254_740_992.0;
     if value.fract() == 0.0 && value.abs() < EXACT {
-        #[expect(clippy::cast_possible_truncation, reason = "whole and below 2⁵³")]
+        #[expect(clippy::cast_possible_truncation, reason = "an integer below 2⁵³")]
         let whole = value as i64;
         serializer.serialize_i64(whole)
     } else {
@@ -366,8 +366,8 @@ impl<'de> Deserialize<'de> for Number {
 
 struct NumberVisitor;
 
-/// The names that stand for a distribution, as error messages list them.
-const LAWS: &[&str] = &["uniform", "normal", "log_normal", "choice", "min", "max"];
+/// Keys of a distribution.
+const KEYS: &[&str] = &["uniform", "normal", "log_normal", "choice", "min", "max"];
 
 impl<'de> Visitor<'de> for NumberVisitor {
     type Value = Number;
@@ -400,14 +400,14 @@ impl<'de> Visitor<'de> for NumberVisitor {
 /// The entries of a table that describes a distribution.
 #[derive(Default)]
 pub(crate) struct Entries {
-    law: Option<Law>,
+    distribution: Option<Distribution>,
     min: Option<f64>,
     max: Option<f64>,
 }
 
 impl Entries {
     pub(crate) fn is_empty(&self) -> bool {
-        self.law.is_none() && self.min.is_none() && self.max.is_none()
+        self.distribution.is_none() && self.min.is_none() && self.max.is_none()
     }
 
     /// Reads the value of the entry `name`.
@@ -415,27 +415,31 @@ impl Entries {
         match name {
             "min" => self.min = Some(map.next_value()?),
             "max" => self.max = Some(map.next_value()?),
-            "uniform" | "normal" | "log_normal" if self.law.is_none() => {
+            "uniform" | "normal" | "log_normal" if self.distribution.is_none() => {
                 let [a, b]: [f64; 2] = map.next_value()?;
-                self.law = Some(match name {
-                    "uniform" => Law::Uniform(a, b),
-                    "normal" => Law::Normal(a, b),
-                    _ => Law::LogNormal(a, b),
+                self.distribution = Some(match name {
+                    "uniform" => Distribution::Uniform(a, b),
+                    "normal" => Distribution::Normal(a, b),
+                    _ => Distribution::LogNormal(a, b),
                 });
             }
-            "choice" if self.law.is_none() => self.law = Some(Law::Choice(map.next_value()?)),
+            "choice" if self.distribution.is_none() => {
+                self.distribution = Some(Distribution::Choice(map.next_value()?))
+            }
             "uniform" | "normal" | "log_normal" | "choice" => {
                 return Err(de::Error::custom("expected one distribution, found two"));
             }
-            other => return Err(de::Error::unknown_field(other, LAWS)),
+            other => return Err(de::Error::unknown_field(other, KEYS)),
         }
         Ok(())
     }
 
     pub(crate) fn finish<E: de::Error>(self) -> Result<Number, E> {
-        let law = self.law.ok_or_else(|| E::custom("expected one of `uniform`, `normal`, `log_normal`, `choice`"))?;
+        let distribution = self
+            .distribution
+            .ok_or_else(|| E::custom("expected one of `uniform`, `normal`, `log_normal`, `choice`"))?;
         let (min, max) = (self.min.unwrap_or(f64::NEG_INFINITY), self.max.unwrap_or(f64::INFINITY));
-        Ok(Number::Drawn { law, min, max })
+        Ok(Number::Drawn { distribution, min, max })
     }
 }
 
@@ -456,7 +460,7 @@ impl Number {
     /// Returns the JSON schemas of a plain number and of each distribution.
     pub(crate) fn forms() -> Vec<serde_json::Value> {
         let pair = serde_json::json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 });
-        let law = |name: &str, values: serde_json::Value| {
+        let form = |name: &str, values: serde_json::Value| {
             serde_json::json!({
                 "type": "object",
                 "properties": { name: values, "min": { "type": "number" }, "max": { "type": "number" } },
@@ -466,10 +470,10 @@ impl Number {
         };
         vec![
             serde_json::json!({ "type": "number" }),
-            law("uniform", pair.clone()),
-            law("normal", pair.clone()),
-            law("log_normal", pair),
-            law("choice", serde_json::json!({ "type": "array", "items": { "type": "number" }, "minItems": 1 })),
+            form("uniform", pair.clone()),
+            form("normal", pair.clone()),
+            form("log_normal", pair),
+            form("choice", serde_json::json!({ "type": "array", "items": { "type": "number" }, "minItems": 1 })),
         ]
     }
 }
@@ -511,7 +515,7 @@ mod tests {
     }
 
     #[test]
-    fn a_normal_has_its_mean_and_spread() {
+    fn a_normal_distribution_has_its_mean_and_standard_deviation() {
         let mut rng = Key { seed: 2, index: 0 }.stream("test", 0, "number");
         let number = Number::normal(5.0, 2.0);
         let n = 10_000;
@@ -523,7 +527,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said() {
+    fn invalid_numbers_have_a_message() {
         assert!(parse("{ unifrom = [1, 2] }").unwrap_err().contains("unknown field `unifrom`"));
         assert!(parse("{ min = 2 }").unwrap_err().contains("expected one of `uniform`"));
         assert!(parse("{ uniform = [1, 2], choice = [1] }").unwrap_err().contains("found two"));
@@ -532,9 +536,9 @@ mod tests {
         assert!(parse("nan").unwrap().problem(0.0, 9.0).unwrap().contains("finite"));
         assert!(parse("inf").unwrap().problem(0.0, 9.0).is_some());
         assert!(parse("{ normal = [1, -1] }").unwrap().problem(0.0, 9.0).is_some());
-        assert!(parse("{ normal = [1, 1] }").unwrap().problem(0.0, 9.0).unwrap().contains("reaches from -3 to 5"));
+        assert!(parse("{ normal = [1, 1] }").unwrap().problem(0.0, 9.0).unwrap().contains("(from -3 to 5)"));
         assert!(parse("{ choice = [] }").unwrap().problem(0.0, 9.0).is_some());
-        assert!(parse("{ normal = [1, 1], min = 8 }").unwrap().problem(0.0, 9.0).unwrap().contains("nothing to draw"));
-        assert!(parse("-1").unwrap().problem(0.0, 9.0).unwrap().contains("outside 0 to 9"));
+        assert!(parse("{ normal = [1, 1], min = 8 }").unwrap().problem(0.0, 9.0).unwrap().contains("no value between"));
+        assert!(parse("-1").unwrap().problem(0.0, 9.0).unwrap().contains("out of range: expected 0 to 9"));
     }
 }

@@ -1,4 +1,4 @@
-//! Recipes to start from: what a slide looks like. Each is a file of `presets/` that holds what differs from the default.
+//! The presets: recipes to start from. Each is a file in `presets/` with the differences from the default recipe.
 
 use super::imaging::{Focus, Optics};
 use super::whole::Recipe;
@@ -7,12 +7,12 @@ use crate::words::words;
 macro_rules! presets {
     ($($(#[$doc:meta])* $Name:ident = $name:literal,)*) => {
         words! {
-            /// A named recipe.
+            /// A preset: a named recipe.
             pub enum Preset { $($(#[$doc])* $Name = $name,)* }
         }
 
         impl Preset {
-            /// The preset as TOML: a line that says what it shows, and what differs from the default.
+            /// Returns the preset as TOML: a comment with its summary, and the differences from the default recipe.
             fn text(self) -> &'static str {
                 match self {
                     $(Self::$Name => include_str!(concat!("../../presets/", $name, ".toml")),)*
@@ -23,60 +23,60 @@ macro_rules! presets {
 }
 
 presets! {
-    /// A liquid-based preparation: free cells and small groups, the default.
+    /// Liquid-based cytology: single cells and small groups (default).
     Lbc = "lbc",
-    /// The paper's simulator with the values of its released code.
+    /// The simulator of the 2015 paper, with the values of its released code.
     Paper2015 = "paper-2015",
-    /// Few cells, hardly any debris.
+    /// Few cells, little debris.
     Sparse = "sparse",
-    /// A field that is covered with cells several layers deep.
+    /// Fields covered with several layers of cells.
     Dense = "dense",
-    /// A conventional smear: thick, uneven, with blood, mucus and leukocytes.
+    /// Conventional smear: thick and uneven, with blood, mucus and leukocytes.
     Conventional = "conventional",
-    /// Cells of a low-grade lesion (LSIL), many with a cleared space round the nucleus.
+    /// Low-grade lesion (LSIL), with koilocytes.
     Lsil = "lsil",
-    /// A field with cells of a high-grade lesion (HSIL), as in the paper's Fig. 13.
+    /// High-grade lesion (HSIL) among normal cells, as in the paper's Fig. 13.
     HighGrade = "high-grade",
     /// Squamous carcinoma.
     Carcinoma = "carcinoma",
-    /// A smear of atrophy: parabasal and basal cells.
+    /// Atrophy: parabasal and basal cells.
     Atrophic = "atrophic",
-    /// Palisades and honeycombs of endocervical cells, metaplastic cells.
+    /// Palisades and honeycombs of endocervical cells, with metaplastic cells.
     Endocervical = "endocervical",
     /// Many leukocytes, bacteria and debris.
     Inflamed = "inflamed",
-    /// Bacterial vaginosis: clue cells and clouds of cocci, no lactobacilli.
+    /// Bacterial vaginosis: clue cells and cocci, no lactobacilli.
     BacterialVaginosis = "bacterial-vaginosis",
     /// *Candida*: pseudohyphae and yeasts among inflamed cells.
     Candida = "candida",
     /// Trichomonads among inflamed cells.
     Trichomonas = "trichomonas",
-    /// Squames of the oral mucosa: another smear, of classes of its own.
+    /// Oral mucosa: another specimen, with its own classes.
     Oral = "oral",
-    /// The default slide as a scanner shows it that fuses planes to pictures of extended focus.
+    /// The default slide as EDF images of a scanner.
     ExtendedFocus = "extended-focus",
 }
 
 impl Preset {
-    /// What the preset shows, in a line.
+    /// Returns a summary in one line.
     #[must_use]
     pub fn summary(self) -> &'static str {
         self.text().lines().next().unwrap_or_default().trim_start_matches("# ")
     }
 
-    /// The recipe.
+    /// Returns the recipe.
     ///
     /// # Panics
     /// Never: the files are part of the crate and its tests read them.
     #[must_use]
     pub fn recipe(self) -> Recipe {
-        Recipe::from_toml(self.text()).expect("the presets that ship are sound")
+        Recipe::from_toml(self.text()).expect("all presets are valid")
     }
 }
 
 impl Recipe {
-    /// The same slide as a scanner shows it that fuses planes to a picture of extended focus: focus, blur, soft edges, noise,
-    /// texture and strength of stain of [`Preset::ExtendedFocus`].
+    /// Returns the same slide as an EDF image of a scanner: with the focus, blur, softness of edges, noise, texture and staining
+    /// strength of [`Preset::ExtendedFocus`].
     #[must_use]
     pub fn fused(mut self) -> Self {
         let like = Preset::ExtendedFocus.recipe();
@@ -104,7 +104,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_preset_is_sound_and_reads_back_as_written() {
+    fn every_preset_is_valid_and_reads_back_as_written() {
         for preset in Preset::ALL {
             let recipe = preset.recipe();
             assert!(recipe.problems().is_empty(), "{}: {:?}", preset.name(), recipe.problems());

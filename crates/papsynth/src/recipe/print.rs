@@ -1,4 +1,4 @@
-//! Recipes as text: TOML whose comments are the documentation of the fields, taken from the schema.
+//! Recipes as TOML, with the documentation of the fields in the schema as comments.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use super::whole::Recipe;
 const COMMENT_WIDTH: usize = 110;
 
 impl Recipe {
-    /// The recipe as TOML, every field with its meaning as a comment.
+    /// Returns the recipe as TOML, with the documentation of each field as a comment.
     ///
     /// # Panics
     /// Never: every recipe can be written as JSON.
@@ -28,7 +28,7 @@ impl Recipe {
         out
     }
 
-    /// The recipe as plain TOML.
+    /// Returns the recipe as TOML without comments.
     ///
     /// # Panics
     /// Never: every recipe can be written as TOML.
@@ -38,7 +38,7 @@ impl Recipe {
     }
 }
 
-/// Prints the fields of a table, plain ones first, tables after them.
+/// Writes the fields of a table: values first, then tables.
 fn table(out: &mut String, path: &str, value: &Value, section: Section<'_>) {
     let Some(fields) = value.as_object() else { return };
     let kind = fields.get("kind").and_then(Value::as_str);
@@ -64,28 +64,28 @@ fn table(out: &mut String, path: &str, value: &Value, section: Section<'_>) {
     }
 }
 
-/// The words that a field may be, or the kinds of a table.
+/// Writes the words that a field accepts, or the kinds of a table, as comments.
 fn choices(out: &mut String, section: Section<'_>) {
     for (word, meaning) in section.choices() {
         comment(out, &format!("  {word}: {meaning}"));
     }
 }
 
-/// The name of a field as TOML wants it: as it stands, or in quotes.
+/// Returns the key of a field in TOML, in quotes if necessary.
 fn key(name: &str) -> String {
     let line = toml::to_string(&BTreeMap::from([(name, 0)])).expect("every name can be a key of TOML");
     line.strip_suffix(" = 0\n").unwrap_or(name).to_owned()
 }
 
-/// Whether a value of a recipe, as JSON, is a table of its own in TOML. Distributions are tables in JSON but are written on one
-/// line.
+/// Returns whether a value of a recipe, as JSON, has its own `[table]` in TOML. Distributions and densities do not: they are
+/// written on one line.
 #[must_use]
 pub fn is_toml_table(value: &Value) -> bool {
     const INLINE: [&str; 5] = ["uniform", "normal", "log_normal", "choice", PER_MM2];
     value.as_object().is_some_and(|map| !INLINE.iter().any(|name| map.contains_key(*name)))
 }
 
-/// A value of a recipe, as JSON, on one line of TOML.
+/// Returns a value of a recipe, given as JSON, on one line of TOML.
 #[must_use]
 pub fn toml_value(value: &Value) -> String {
     match value {

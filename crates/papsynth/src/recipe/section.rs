@@ -1,8 +1,8 @@
-//! The declaration of sections: each number of a recipe is written once, with its meaning, default, range and unit.
+//! The declaration of sections: each number of a recipe is declared once, with documentation, default, range and unit.
 //!
-//! From a declaration follow the struct with its documentation, its `Default`, how it is read and written, the bounds of
-//! the JSON schema, what [`Recipe::problems`](super::Recipe::problems) checks and, where a section is drawn number by
-//! number, the drawn struct and the names of the streams.
+//! The declaration generates the struct with its documentation, `Default`, reading and writing, the bounds of the JSON schema,
+//! the checks of [`Recipe::problems`](super::Recipe::problems) and, for a section that is drawn number by number, the drawn struct
+//! and the names of the streams.
 
 use std::borrow::Cow;
 
@@ -13,14 +13,14 @@ use super::number::Number;
 pub(crate) struct Bounds {
     pub(crate) low: f64,
     pub(crate) high: f64,
-    /// Whether something is counted: a value that is written out must then be whole.
+    /// Whether it is a count: fixed values must be integers.
     pub(crate) whole: bool,
 }
 
-/// A declared number of a recipe, with the value that the recipe gives it.
+/// A declared number of a recipe and its value.
 #[derive(Debug, Clone)]
 pub(crate) struct Declared<'a> {
-    /// The field, as a dotted path.
+    /// The dotted path of the field.
     pub(crate) path: String,
     pub(crate) value: Value<'a>,
     pub(crate) bounds: Bounds,
@@ -33,12 +33,12 @@ pub(crate) enum Value<'a> {
     Real(Cow<'a, Number>),
     /// A density per mm².
     Density(&'a Number),
-    /// A whole number, exact beyond 2⁵³.
+    /// An integer, exact beyond 2⁵³.
     Whole(u64),
 }
 
 impl Declared<'_> {
-    /// What is wrong with the value, if anything: its range, and whether it is whole.
+    /// Returns messages about an invalid value: its range, and whether it is an integer.
     pub(crate) fn problems(&self) -> impl Iterator<Item = String> {
         let Bounds { low, high, whole } = self.bounds;
         let [range, fraction] = match &self.value {
@@ -46,16 +46,16 @@ impl Declared<'_> {
             Value::Density(number) => [number.problem(low, high).map(|problem| format!("{problem} per mm²")), None],
             Value::Whole(value) => {
                 let outside = *value < low as u64 || *value > high as u64;
-                [outside.then(|| format!("{value} is outside {low} to {high}")), None]
+                [outside.then(|| format!("{value} is out of range: expected {low} to {high}")), None]
             }
         };
         range.into_iter().chain(fraction)
     }
 }
 
-/// A part of a recipe whose numbers are declared: a section, a number, or a word or a text, which have none.
+/// A part of a recipe: a section, a number, or a word or a string, which have no declared numbers.
 pub(crate) trait Part {
-    /// Lists the numbers of the part, which stands at `path`. `bounds` are those of the field, if it is a number.
+    /// Appends the numbers of the part at `path`. `bounds` are those of the field, if it is a number.
     fn list<'a>(&'a self, _path: &str, _bounds: Option<Bounds>, _found: &mut Vec<Declared<'a>>) {}
 }
 
@@ -79,22 +79,22 @@ numbers! {
 
 impl Part for String {}
 
-/// The dotted path of a field of the part at `path`.
+/// Returns the dotted path of a field of the part at `path`.
 pub(crate) fn within(path: &str, field: &str) -> String {
     if path.is_empty() { field.to_owned() } else { format!("{path}.{field}") }
 }
 
 /// Declares a section of a recipe, or a choice of words or of sections.
 ///
-/// A field is `name: Kind = default, low..=high, "unit";`. `Kind` is [`Number`], [`Count`](super::Count), a plain number,
-/// or the type of a word, a text or another section, which have no range; a section needs no default of its own.
+/// A field is `name: Kind = default, low..=high, "unit";`. `Kind` is [`Number`], [`Count`](super::Count),
+/// [`Abundance`](super::Abundance), a plain number, or the type of a word, a string or another section, which have no range. A
+/// section needs no default.
 ///
-/// With `drawn as pub Name`, the struct `Name` holds one drawn value for each field, and `draw` draws each from the stream
-/// named after the field's dotted path. With `drawn from rng as pub Name`, `one` draws them from one stream, field after
-/// field; dyes are left at zero there, and set by the caller. A field marked `(undrawn)` is left out, one marked `(last)`
-/// follows the others. `(Count as name: "Meaning.")` gives the drawn value a name of its own, `Chance` in place of `Count`
-/// says whether it happened. What is `(given Type)` or `(given Type as name: "Meaning.")`, and what is listed after `also`, the
-/// caller sets.
+/// With `drawn as pub Name`, the struct `Name` has a drawn value of each field, and `draw` draws each from the stream with the
+/// dotted path of the field. With `drawn from rng as pub Name`, `one` draws all fields from one stream, in their order; dyes are
+/// zero there, and set by the caller. A field marked `(undrawn)` is omitted, a field marked `(last)` follows the others.
+/// `(Count as name: "Documentation.")` renames the drawn value; `Chance` in place of `Count` draws whether the event occurs. The
+/// caller sets fields marked `(given Type)` or `(given Type as name: "Documentation.")`, and fields listed after `also`.
 macro_rules! section {
     ($(#[$meta:meta])* pub struct $Name:ident $(, drawn $(from $source:ident)? as $visible:vis $Drawn:ident)? {
         $($(#[$about:meta])* $field:ident: $Kind:ident $(($($mark:tt)*))? $(= $default:expr $(, $low:literal..=$high:literal $(, $unit:literal)?)?)?;)*
@@ -192,7 +192,7 @@ macro_rules! section {
         Some($crate::recipe::section::Bounds { low: $low as f64, high: $high as f64, whole: false })
     };
 
-    // One field after the other: those that are drawn, then those that follow the others.
+    // Field by field: drawn fields, then fields marked `(last)`.
     (@drawn $Name:ident () $($rest:tt)*) => {};
     (@drawn $Name:ident $drawn:tt [$($done:tt)*] [$($last:tt)*] { $about:tt $field:ident $Kind:ident (undrawn) $low:tt } $($rest:tt)*) => {
         section!(@drawn $Name $drawn [$($done)*] [$($last)*] $($rest)*);
@@ -213,7 +213,7 @@ macro_rules! section {
         section!(@drawn $Name $drawn [$($done)* { $about $field $field $Kind $low }] $last $($rest)*);
     };
     (@drawn $Name:ident ($source:tt $visible:vis $Drawn:ident) [$({ [$(#[$about:meta])*] $own:ident $field:ident $Kind:tt $low:tt })*] []) => {
-        #[doc = concat!("What is drawn from [`", stringify!($Name), "`](crate::recipe::", stringify!($Name), ").")]
+        #[doc = concat!("Values drawn from [`", stringify!($Name), "`](crate::recipe::", stringify!($Name), ").")]
         #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
         #[serde(deny_unknown_fields)]
         $visible struct $Drawn { $($(#[$about])* pub $own: section!(@value $source $Kind),)* }
@@ -225,7 +225,7 @@ macro_rules! section {
     };
     (@draw () $Name:ident $Drawn:ident $({ $own:ident $field:ident $Kind:tt $low:tt })*) => {
         impl $Name {
-            /// Draws each number from the stream named after its place: `path` is that of the section.
+            /// Draws each number from the stream with its dotted path. `path` is that of the section.
             pub(crate) fn draw(&self, path: &str, stream: impl Fn(&str) -> $crate::key::Stream) -> $Drawn {
                 let stream = |field: &str| stream(&$crate::recipe::section::within(path, field));
                 $Drawn { $($own: section!(@one () $Kind $low self.$field, &mut stream(stringify!($field))),)* }
@@ -255,9 +255,9 @@ macro_rules! section {
     (@one $source:tt $Kind:ident $low:tt $value:expr, $rng:expr) => { $value };
 }
 
-/// The name of a number and the number itself: `named!(recipe.slide.depth_um)` names it `slide.depth_um`, and
-/// `named!(self.count)` names it `count`. With the path of a section, the name is the dotted path:
-/// `named!("layout", band.width_um)` names it `layout.width_um`.
+/// Returns the path of a number and the number: `named!(recipe.slide.depth_um)` has the path `slide.depth_um`, and
+/// `named!(self.count)` the path `count`. With the path of a section, as in `named!("layout", band.width_um)`, the path is
+/// `layout.width_um`.
 macro_rules! named {
     ($section:literal, $owner:ident.$number:ident) => {
         (concat!($section, ".", stringify!($number)), &$owner.$number)

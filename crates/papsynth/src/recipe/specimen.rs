@@ -1,4 +1,4 @@
-//! Sections of a recipe about the cells: slide, layout, cells, cytoplasm, nucleus, stain.
+//! The sections of a recipe about the cells: slide, layout, cells, cytoplasm, nucleus, stain.
 
 use std::collections::BTreeMap;
 
@@ -12,78 +12,77 @@ use super::number::{Count, Number};
 use super::section::{Bounds, Declared, Part, section, within};
 
 section! {
-    /// How deep the cells lie ("Final Image Formation": depth from a median-filtered Perlin image).
-    pub struct Slide {
-        /// Depth over which the cells of a field lie.
+    /// Depth and spacing of the cells ("Final Image Formation": depth from a median-filtered Perlin image).
+    pub struct SlideSection {
+        /// Range of depth of the cells of a field, without `stacking_um`.
         depth_um: Number = Number::uniform(1.0, 4.0), 0..=1000, "µm";
-        /// Size of the cells of the Perlin noise that says how depth varies over the field.
+        /// Length scale of the variation of depth: cell size of its Perlin noise.
         depth_scale_um: Number = 90.0, 1..=10000, "µm";
-        /// Width of the median filter on that noise.
+        /// Width of the median filter of the depth.
         depth_filter_um: Number = 20.0, 0..=1000, "µm";
-        /// Standard deviation of a cell's own depth about the relief: cells that lie on each other.
+        /// Standard deviation of the depth of a cell about that of its place, for cells on top of each other.
         stacking_um: Number = 0.6, 0..=100, "µm";
-        /// Least distance between the middles of two cells; drawn once a field.
+        /// Minimum distance between the centres of cells. Drawn once a field.
         spacing_um: Number = 9.0, 0..=1000, "µm";
-        /// Fields that are taken of one slide: images 0 to n − 1 show the first, the next n the second. Fields of one
-        /// slide were stained together.
+        /// Fields per slide. The first n images show slide 0, the next n slide 1. Fields of a slide share its stain.
         fields_per_slide: usize = 16, 1..=1000000;
     }
 }
 
-/// Where the cells lie: the weight map of "Population Distribution Generation".
+/// Layout of the cells: the weight map of "Population Distribution Generation".
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Layout {
-    /// Anywhere, all places equally likely (Eq. 5).
+    /// Uniform over the field (Eq. 5).
     Uniform {},
-    /// Round clusters at random places, and some cells outside them.
+    /// Round clusters at random places, and cells outside them.
     Clusters(Clusters),
-    /// A band of material across the image.
+    /// One band of cells across the field.
     Band(Band),
-    /// A grey image that is stretched over the field: white is likely, black never happens.
+    /// A grey image, stretched over the field, as the relative density of cells: 0 at black.
     DensityMap {
-        /// File of the image, relative to the recipe.
+        /// File of the density map, relative to the recipe.
         path: String,
     },
-    /// The layout of a given label image: as likely as the place is covered by a label there.
+    /// The density of the labels of a given label image.
     #[serde(deserialize_with = "labels_of_a_file")]
     Labels(Labels),
 }
 
 section! {
-    /// Round clusters at random places, and some cells outside them.
+    /// Round clusters at random places, and cells outside them.
     pub struct Clusters {
-        /// Number of clusters; drawn once a field.
+        /// Number of clusters. Drawn once a field.
         count: Abundance = Abundance::per_mm2(Number::uniform(55.0, 125.0)), 1..=10000, "per field or per mm²";
-        /// Radius (standard deviation) of a cluster; drawn for each cluster.
+        /// Radius (standard deviation) of a cluster. Drawn for each cluster.
         radius_um: Number = Number::uniform(14.0, 34.0), 1..=10000, "µm";
-        /// Weight of the places outside all clusters, relative to a cluster's centre.
+        /// Density outside the clusters, relative to the centre of a cluster.
         outside: Number = Number::uniform(0.03, 0.15), 0..=1;
     }
 }
 
 section! {
-    /// A band of material across the image.
+    /// One band of cells across the field.
     pub struct Band {
         /// Width (standard deviation) of the band.
         width_um: Number = 40.0, 1..=10000, "µm";
-        /// Weight of the places outside the band, relative to its middle.
+        /// Density outside the band, relative to its centre line.
         outside: Number = Number::uniform(0.03, 0.15), 0..=1;
     }
 }
 
 section! {
-    /// The layout of a given label image: as likely as the place is covered by a label there.
+    /// The density of the labels of a given label image.
     #[schemars(extend("required" = ["path"]))]
     pub struct Labels {
         /// File of the label image, relative to the recipe.
         path: String;
-        /// Standard deviation of the smoothing of its coverage.
+        /// Standard deviation of the smoothing of the labels.
         smooth_um: Number = 5.0, 0..=1000, "µm";
     }
 }
 
-/// Reads a [`Labels`], whose file has no default.
+/// Reads a [`Labels`], whose `path` has no default.
 fn labels_of_a_file<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Labels, D::Error> {
     let labels = Labels::deserialize(deserializer)?;
     if labels.path.is_empty() { Err(D::Error::missing_field("path")) } else { Ok(labels) }
@@ -106,7 +105,7 @@ impl Part for Layout {
     }
 }
 
-/// The cells of a recipe, by the name of their class in the model.
+/// Cells of a recipe, by the name of their class in the model.
 pub type Cells = BTreeMap<String, CellMix>;
 
 impl Part for Cells {
@@ -117,7 +116,7 @@ impl Part for Cells {
     }
 }
 
-/// The cells of the default slide.
+/// Returns the cells of the default recipe.
 pub(super) fn default_cells() -> Cells {
     let cells = [
         ("intermediate", 85.0, 250.0),
@@ -136,63 +135,63 @@ pub(super) fn default_cells() -> Cells {
 }
 
 section! {
-    /// How many cells of a class there are, and how they differ from the model's.
+    /// Number of cells of a class, and their differences from the model.
     pub struct CellMix {
-        /// Number of cells of this class; drawn once a field.
+        /// Number of cells of the class. Drawn once a field.
         count: Abundance = Abundance::per_mm2(110), 0..=100000, "per field or per mm²";
-        /// Factor on the size of the whole cell; drawn for each cell.
+        /// Size factor of the cell. Drawn for each cell.
         size: Number = 1.0, 0.1..=10;
-        /// Factor on the absorbance of its cytoplasm; drawn for each cell.
+        /// Absorbance factor of the cytoplasm. Drawn for each cell.
         cytoplasm_stain: Number = 1.0, 0..=20;
-        /// Factor on the absorbance of its nucleus; drawn for each cell.
+        /// Absorbance factor of the nucleus. Drawn for each cell.
         nucleus_stain: Number = 1.0, 0..=20;
-        /// How likely its cytoplasm is to take each tint.
+        /// Relative frequencies of the tints of the cytoplasm.
         tints: TintMix;
-        /// How its cells lie together.
+        /// Grouping of the cells.
         group: Group;
     }
 }
 
 section! {
-    /// How cells of a class lie together.
+    /// Grouping of the cells of a class.
     pub struct Group {
-        /// The form of a group.
+        /// Form of the groups.
         form: GroupForm = GroupForm::Single;
-        /// Cells of a group; drawn for each group.
+        /// Number of cells of a group. Drawn for each group.
         size: Count = 1, 1..=1000;
-        /// Distance between the middles of neighbours, relative to their diameter: below 1 they overlap.
+        /// Distance between the centres of neighbours, relative to their diameter. Neighbours overlap below 1.
         distance: Number = Number::uniform(0.75, 0.95), 0.2..=3;
     }
 }
 
 section! {
-    /// The form of a group of cells.
+    /// Form of a group of cells.
     pub enum GroupForm {
-        /// Every cell has a place of its own, where the layout lets it lie.
+        /// Single cells, placed independently.
         Single,
-        /// An irregular heap, each cell beside one that lies there already.
+        /// An irregular aggregate: each cell next to another one.
         Aggregate,
-        /// One layer, cell beside cell as in a pavement seen from above: the honeycomb of endocervical cells.
+        /// A single layer of adjacent cells, as the honeycomb of endocervical cells.
         Honeycomb,
-        /// A row of cells side by side, all turned the same way: the palisade of columnar cells.
+        /// A row of parallel cells, as the palisade of columnar cells.
         Palisade,
     }
 }
 
 section! {
-    /// How likely each tint of cytoplasm is, relative to the others.
+    /// Relative frequencies of the tints of cytoplasm.
     pub struct TintMix {
-        /// Blue-green, as in young and intermediate cells.
+        /// Relative frequency of blue-green, as in parabasal and intermediate cells.
         cyanophilic: Number = 0.85, 0..=1000;
-        /// Pink, as in superficial cells.
+        /// Relative frequency of pink, as in superficial cells.
         eosinophilic: Number = 0.15, 0..=1000;
-        /// Orange, as in keratinised cells.
+        /// Relative frequency of orange, as in keratinised cells.
         orangeophilic: Number = 0.0, 0..=1000;
     }
 }
 
 impl TintMix {
-    /// The tints of superficial cells.
+    /// Returns the tints of superficial cells.
     #[must_use]
     pub fn superficial() -> Self {
         Self { cyanophilic: 0.25.into(), eosinophilic: 0.65.into(), orangeophilic: 0.1.into() }
@@ -200,203 +199,200 @@ impl TintMix {
 }
 
 section! {
-    /// How shapes vary about their mean.
+    /// Model of the variation of shapes.
     pub enum ShapeSpread {
-        /// Aligned descriptors with a shrinkage covariance; self-intersecting draws are drawn again.
+        /// Aligned descriptors with a shrinkage covariance. Self-intersecting shapes are drawn again.
         Correlated,
-        /// The paper's: every descriptor an independent normal.
+        /// The paper's model: independent normal descriptors.
         Independent,
     }
 }
 
 section! {
-    /// How the cytoplasm becomes a sheet.
+    /// Model of the cytoplasm as a sheet.
     pub enum Sheet {
         /// Extended position-based dynamics with bending, under a cover glass.
         Xpbd,
-        /// The paper's: Verlet steps for every vertex (Eq. 4).
+        /// The paper's model: Verlet integration of every vertex (Eq. 4).
         Verlet,
-        /// No folds at all.
+        /// A flat sheet without folds.
         Flat,
     }
 }
 
 section! {
-    /// Parts of a cell that lie doubled back on it.
+    /// Folds of the cytoplasm.
     pub struct Folds {
-        /// Probability that a flap of the cell lies folded back on it.
+        /// Probability of a flap: a part of the cell folded back on it.
         flap: Number = 0.38, 0..=1;
-        /// Probability that a rim is rolled up.
+        /// Probability of a rolled rim.
         roll: Number = 0.18, 0..=1;
-        /// Probability that the cell is folded over completely, like a cigar.
+        /// Probability that both sides of the cell are folded over, like a cigar.
         folded_over: Number = 0.02, 0..=1;
-        /// How far in from the rim a flap begins, as a fraction of the cell's radius.
+        /// Distance of the crease of a flap from the rim, as a fraction of the radius of the cell.
         depth: Number = Number::uniform(0.10, 0.50), 0.02..=0.9;
-        /// Radius of the bend.
+        /// Bending radius of a fold.
         radius_um: Number = Number::uniform(0.35, 0.8), 0.1..=5, "µm";
     }
 }
 
 section! {
-    /// The cytoplasm of every cell.
+    /// Cytoplasm of all cells.
     pub struct Cytoplasm, drawn from rng as pub CellDetail {
-        /// How outlines vary about their mean.
+        /// Model of the variation of outlines.
         shape: ShapeSpread (undrawn) = ShapeSpread::Correlated;
-        /// How the cytoplasm becomes a sheet.
+        /// Model of the cytoplasm as a sheet.
         sheet: Sheet (undrawn) = Sheet::Xpbd;
-        /// Area of the flat sheet relative to the cell's: more makes more wrinkles.
+        /// Area of the flat sheet, relative to the area of the cell. Larger values give more wrinkles.
         excess_area: Number (given f64) = Number::uniform(1.04, 1.16), 1..=2;
-        /// Parts that lie doubled back.
+        /// Folds of the cytoplasm.
         folds: Folds (undrawn);
-        /// How nearly straight the sides of a cell run between its corners: 0 is not at all.
+        /// Angularity of the outline: 0 is smooth, 1 a polygon.
         angularity: Number (given f64) = Number::uniform(0.10, 0.60), 0..=1;
-        /// Notches in its rim.
+        /// Number of notches of the rim.
         notches: Number (given usize) = Number::uniform(0.0, 14.0), 0..=20;
-        /// Tongues that stand out of its rim.
+        /// Number of protrusions of the rim.
         protrusions: Number (given usize) = Number::uniform(0.0, 9.0), 0..=20;
-        /// Wrinkles of a cell: narrow creases in which the sheet lies doubled.
+        /// Number of wrinkles: narrow creases where the sheet is double.
         wrinkles: Number (given usize) = Number::log_normal(7.0, 0.6), 0..=100;
-        /// Thickness that a wrinkle adds at its crest, relative to the flat sheet.
+        /// Additional thickness at the crest of a wrinkle, relative to the flat sheet.
         wrinkle_thickness: Number (given f64) = Number::log_normal(0.42, 0.42), 0..=5;
-        /// Width of a wrinkle (standard deviation of its crest).
+        /// Width of a wrinkle: standard deviation of its profile.
         wrinkle_um: Number (given f64) = Number::uniform(0.18, 0.5), 0.05..=5, "µm";
-        /// How much denser and more granular the cytoplasm is round the nucleus than outside.
+        /// Additional density and granularity of the cytoplasm around the nucleus, relative to the rest.
         endoplasm: Number (given f64) = Number::log_normal(0.08, 0.6), 0..=2;
-        /// First level of detail: strength of low-frequency Gaussian noise, relative to the cytoplasm's absorbance.
+        /// Amplitude of the first level of detail, low-frequency Gaussian noise, relative to the absorbance of the cytoplasm.
         clouds: Number = Number::uniform(0.10, 0.34), 0..=2;
-        /// Standard deviation of its smoothing.
+        /// Standard deviation of the smoothing of that noise.
         clouds_um: Number = Number::uniform(3.0, 14.0), 0.1..=100, "µm";
-        /// Second level of detail: strength of thresholded Brownian flecks, relative to the cytoplasm's absorbance.
+        /// Amplitude of the second level of detail, thresholded Brownian flecks, relative to the absorbance of the cytoplasm.
         flecks: Number = Number::log_normal(0.14, 0.5).at_least(0.0).at_most(0.5), 0..=5;
-        /// Share of the cell that the flecks leave free.
+        /// Fraction of the cell without flecks.
         flecks_threshold: Number = Number::uniform(0.55, 0.85), 0..=0.999;
-        /// Third level of detail: strength of the cytoskeleton, relative to the cytoplasm's absorbance.
+        /// Amplitude of the third level of detail, the cytoskeleton, relative to the absorbance of the cytoplasm.
         cytoskeleton: Number = Number::uniform(0.05, 0.18), 0..=2;
-        /// Fine grain of the cytoplasm, relative to its absorbance.
+        /// Amplitude of the fine grain of the cytoplasm, relative to its absorbance.
         grain: Number = Number::uniform(0.06, 0.18), 0..=2;
-        /// Probability that a cell is peppered with granules.
+        /// Probability that a cell is granular.
         granular: Number (undrawn) = 0.2, 0..=1;
-        /// Granules of such a cell per 100 µm².
+        /// Number of granules of a granular cell per 100 µm².
         granules: Number
-            (given f64 as granules: "Granules per 100 µm²; 0 if the cell has none.") = Number::log_normal(12.0, 0.6), 0..=1000;
-        /// Roughness of the rim: the edge is frayed over about this distance.
+            (given f64 as granules: "Number of granules per 100 µm², 0 if the cell is not granular.") = Number::log_normal(12.0, 0.6), 0..=1000;
+        /// Roughness of the rim: width over which it is frayed.
         fray_um: Number = Number::log_normal(0.65, 0.45), 0..=5, "µm";
-        /// Distance over which the sheet thins out towards its rim.
+        /// Width of the thinner rim of the sheet.
         rim_um: Number (given f64) = Number::log_normal(2.2, 0.36), 0..=10, "µm";
-        /// How much thicker the sheet is towards one side (standard deviation of the slope, relative to its thickness
-        /// and the cell's radius).
+        /// Gradient of the thickness of the sheet: standard deviation of the relative change over the radius of the cell.
         thickness_gradient: Number
-            (given [f64; 2] as thickness_gradient: "How much thicker to the right and below, relative to its thickness, a radius away.")
+            (given [f64; 2] as thickness_gradient: "Relative change of the thickness over a radius to the right and downwards.")
             = 0.18, 0..=1;
-        /// How late light comes through a flat sheet: thicker parts and folds in proportion. It shows as bright and
-        /// dark rims that change places when the focus passes.
+        /// Phase delay of the flat sheet, in proportion to the thickness elsewhere. It gives bright and dark rims that swap when the
+        /// focus passes.
         phase_rad: Number (undrawn) = Number::uniform(0.05, 0.15), -3..=3, "radians of phase";
     }
 }
 
 section! {
-    /// Where the texture of nuclei comes from.
+    /// Source of the texture of nuclei.
     pub enum Chromatin {
-        /// Quilted from patches of donors: real ones where the model has learned some, else made from its spectrum.
+        /// Quilted from patches of donors: learned nuclei of the model, or textures made from its spectrum.
         Quilt,
-        /// A random field of the model's spectrum, a new one for every nucleus.
+        /// A new random field with the spectrum of the model for each nucleus.
         Field,
     }
 }
 
 section! {
-    /// Which patches of the donors are candidates ("Texture synthesis").
+    /// Selection of the patches of the donors ("Texture synthesis").
     pub enum Acceptance {
-        /// All whose overlap differs by at most a tenth more than that of the best one.
+        /// A random one of the patches whose overlap differs by at most 10 % more than that of the best patch.
         Near,
-        /// The paper's: the first random one whose overlap differs by less than d_max.
+        /// The paper's method: the first random patch whose overlap differs by less than `d_max`.
         Threshold,
     }
 }
 
 section! {
-    /// How patches are joined.
+    /// Seams between patches.
     pub enum Seam {
-        /// Along the path of least difference.
+        /// Along the path of minimum difference.
         MinCut,
-        /// The paper's: weighted by the distance to the patches' edges.
+        /// The paper's method: blended, weighted by the distance to the edges of the patches.
         Feather,
     }
 }
 
 section! {
-    /// What happens to nuclei whose donors were images already (Eqs. 15, 16).
+    /// Restoration of nuclei whose donors are images (Eqs. 15, 16).
     pub enum Restore {
-        /// Transmitted light is restored before detection: such nuclei are not blurred twice, and carry their donors' noise
-        /// and the camera's.
+        /// The transmitted light is restored before detection. The nuclei are not blurred twice, and have the noise of their donors
+        /// and of the camera.
         BeforeDetection,
-        /// The paper's: restored in the finished image; such nuclei carry their donors' noise alone.
+        /// The paper's method: the image is restored after detection. The nuclei have the noise of their donors only.
         AfterDetection,
-        /// They are imaged like everything else.
+        /// No restoration.
         Off,
     }
 }
 
 section! {
-    /// The nucleus of every cell.
+    /// Nuclei of all cells.
     pub struct Nucleus {
-        /// How outlines vary about their mean.
+        /// Model of the variation of outlines.
         shape: ShapeSpread = ShapeSpread::Correlated;
-        /// Where the texture comes from.
+        /// Source of the texture.
         chromatin: Chromatin = Chromatin::Quilt;
-        /// Donors of one nucleus (the paper's: 3).
+        /// Number of donors of a nucleus (the paper: 3).
         donors: Count = 3, 1..=64;
         /// Size of a patch (the released value: 7 px of 0.25 µm).
         patch_um: Number = 1.75, 0.5..=20, "µm";
         /// Overlap of patches (the released value: 2 px of 0.25 µm).
         overlap_um: Number = 0.5, 0.25..=10, "µm";
-        /// Which patches are candidates.
+        /// Selection of the patches.
         acceptance: Acceptance = Acceptance::Near;
-        /// d_max of the paper: root-mean-square difference of absorbance over the overlap.
+        /// Largest accepted root-mean-square difference of the absorbance over the overlap (d_max of the paper).
         d_max: Number = 0.1, 0..=10;
-        /// How patches are joined.
+        /// Seams between patches.
         seam: Seam = Seam::MinCut;
-        /// What happens to nuclei whose donors were images already.
+        /// Restoration of nuclei whose donors are images.
         restore: Restore = Restore::BeforeDetection;
-        /// Spread of the feathered mask of that.
+        /// Standard deviation of the feathered mask of the restoration.
         restore_feather_um: Number = 0.3, 0..=5, "µm";
-        /// Probability that a nucleus is pyknotic (small, dark, without structure).
+        /// Probability that a nucleus is pyknotic: small, dark, without structure.
         pyknotic: Number = 0.05, 0..=1;
         /// Probability that a nucleus is wrinkled or angular.
         wrinkled: Number = 0.15, 0..=1;
         /// Absorbance of the rim (the nuclear membrane) relative to the nucleus.
         rim: Number = Number::uniform(0.0, 0.2), 0..=2;
-        /// Share of a nucleus's thickness that is domed: 0 is a plate, 1 an ellipsoid.
+        /// Fraction of the thickness of a nucleus that is domed: 0 is a plate, 1 an ellipsoid.
         dome: Number = Number::uniform(0.3, 0.85), 0..=1;
-        /// How much thicker a nucleus is towards one side (standard deviation of the slope, relative to its thickness
-        /// and radius).
+        /// Gradient of the thickness of a nucleus: standard deviation of the relative change over its radius.
         thickness_gradient: Number = 0.2, 0..=1;
-        /// Part of the variance of chromatin that is coarse, a micrometre and a half wide: what lies above and below
-        /// the grains in focus.
+        /// Fraction of the variance of chromatin that is coarse (1.5 µm), from chromatin above and below the focus.
         clumping: Number = Number::uniform(0.0, 0.4), 0..=1;
-        /// How softly a nucleus ends: standard deviation of the fall of its thickness about its outline.
+        /// Softness of the edge of a nucleus: standard deviation of the falloff of its thickness at the outline.
         edge_um: Number = Number::uniform(0.0, 0.2), 0..=3, "µm";
     }
 }
 
 section! {
-    /// How evenly the stain was taken up.
+    /// Stain: its strength, its variation and its dyes.
     pub struct Stain {
-        /// Factor on the absorbance of all cytoplasm of a slide; drawn once a slide.
+        /// Absorbance factor of the cytoplasm of a slide. Drawn once a slide.
         slide_cytoplasm: Number = Number::log_normal(0.75, 0.2), 0..=20;
-        /// Factor on the absorbance of all nuclei of a slide; drawn once a slide.
+        /// Absorbance factor of the nuclei of a slide. Drawn once a slide.
         slide_nucleus: Number = Number::log_normal(0.75, 0.25), 0..=20;
-        /// Factor on the absorbance of all cytoplasm of a field; drawn once a field.
+        /// Absorbance factor of the cytoplasm of a field. Drawn once a field.
         field_cytoplasm: Number = Number::log_normal(1.0, 0.2), 0..=20;
-        /// Factor on the absorbance of all nuclei of a field; drawn once a field.
+        /// Absorbance factor of the nuclei of a field. Drawn once a field.
         field_nucleus: Number = Number::log_normal(1.0, 0.12), 0..=20;
-        /// Factor on the contrast of the texture inside all nuclei of a field; drawn once a field.
+        /// Contrast factor of the texture of the nuclei of a field. Drawn once a field.
         field_texture: Number = Number::log_normal(0.7, 0.28), 0..=20;
-        /// Balance of the dyes: standard deviation of the logarithm of each dye's amount between slides.
+        /// Variation of the dye balance between slides: standard deviation of the logarithm of each dye's amount.
         slide_balance: Number = 0.15, 0..=2;
-        /// The same between the fields of a slide.
+        /// Variation of the dye balance between the fields of a slide, as `slide_balance`.
         field_balance: Number = 0.05, 0..=2;
-        /// The same between the cells of a field.
+        /// Variation of the dye balance between the cells of a field, as `slide_balance`.
         cell_balance: Number = 0.12, 0..=2;
         /// Dyes of cyanophilic cytoplasm.
         cyanophilic: DyeAmounts = DyeAmounts { light_green: 2.68, eosin_y: 0.3, orange_g: 0.5, ..DyeAmounts::none() };
@@ -404,7 +400,7 @@ section! {
         eosinophilic: DyeAmounts = DyeAmounts { eosin_y: 2.6, orange_g: 0.8, light_green: 0.4, ..DyeAmounts::none() };
         /// Dyes of orangeophilic, keratinised cytoplasm.
         orangeophilic: DyeAmounts = DyeAmounts { orange_g: 4.5, eosin_y: 1.2, light_green: 0.2, ..DyeAmounts::none() };
-        /// Dyes of nuclei, also of leukocytes.
+        /// Dyes of nuclei, including those of leukocytes.
         nucleus: DyeAmounts = DyeAmounts { haematein: 1.0, eosin_y: 0.1, light_green: 0.05, ..DyeAmounts::none() };
         /// Dyes of bacteria.
         bacillus: DyeAmounts = DyeAmounts { haematein: 0.6, light_green: 1.15, ..DyeAmounts::none() };

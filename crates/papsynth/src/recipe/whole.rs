@@ -1,55 +1,55 @@
-//! A recipe as a whole: its sections.
+//! The recipe and its sections.
 
-use super::camera::Camera;
-use super::imaging::{Background, Field, Focus, Light, Optics};
+use super::camera::CameraSection;
+use super::imaging::{Background, Field, Focus, LightSection, Optics};
 use super::number::Number;
 use super::scan::Scan;
 use super::section::{Declared, Part, section};
-use super::specimen::{Cells, Cytoplasm, Layout, Nucleus, Slide, Stain, default_cells};
+use super::specimen::{Cells, Cytoplasm, Layout, Nucleus, SlideSection, Stain, default_cells};
 use crate::debris::Debris;
 use crate::scene::MARGIN_UM;
 
-/// The version of recipes that this crate reads and writes.
+/// The recipe version that this crate reads and writes.
 pub const RECIPE_VERSION: u32 = 1;
 
 section! {
-    /// A recipe: everything that decides an image except the model, the seed and the index.
+    /// A recipe. Together with a model, a seed and an index it determines an image.
     pub struct Recipe {
-        /// Version of this file's format.
+        /// Version of the recipe format.
         version: u32 = RECIPE_VERSION;
-        /// The image: its size and the size of its pixels.
+        /// Image: its size and its pixel size.
         field: Field;
         /// Focal planes: one for an image, several for a focus stack.
         focus: Focus;
-        /// The slide: how deep the cells lie.
-        slide: Slide;
-        /// Where the cells lie.
+        /// Slide: depth and spacing of the cells.
+        slide: SlideSection;
+        /// Layout of the cells.
         layout: Layout;
-        /// The cells, by the name of their class in the model.
+        /// Cells, by the name of their class in the model.
         cells: Cells = default_cells();
-        /// The cytoplasm of every cell.
+        /// Cytoplasm of all cells.
         cytoplasm: Cytoplasm;
-        /// The nucleus of every cell.
+        /// Nuclei of all cells.
         nucleus: Nucleus;
-        /// How evenly the stain was taken up.
+        /// Stain: its strength, its variation and its dyes.
         stain: Stain;
-        /// Everything that is no epithelial cell.
+        /// Debris: everything except epithelial cells.
         debris: Debris;
-        /// The empty slide, as the lamp shows it.
+        /// Background: the light of the empty slide.
         background: Background;
-        /// The light: one wavelength or three colours.
-        light: Light;
-        /// How light spreads between slide and sensor.
+        /// Light: monochrome or colour.
+        light: LightSection;
+        /// Optics between slide and sensor.
         optics: Optics;
-        /// The camera.
-        camera: Camera;
-        /// A whole slide.
+        /// Camera.
+        camera: CameraSection;
+        /// Whole slides.
         scan: Scan;
     }
 }
 
 impl Recipe {
-    /// Every declared number, in the order of the sections.
+    /// Returns every declared number, in the order of the sections.
     pub(crate) fn numbers(&self) -> Vec<Declared<'_>> {
         let mut found = Vec::new();
         self.list("", None, &mut found);
@@ -96,7 +96,7 @@ impl Recipe {
         cells.chain(debris).map(|(path, abundance)| (path, abundance.mean(area_mm2))).collect()
     }
 
-    /// The recipe of a TOML text. Whether its numbers are within their ranges is not checked.
+    /// Reads a recipe from TOML. Ranges are not checked: see [`Recipe::problems`].
     ///
     /// # Errors
     /// If the text is not TOML, or a field is unknown or of another type.
@@ -104,7 +104,7 @@ impl Recipe {
         toml::from_str(text)
     }
 
-    /// Takes those sections of another recipe whose names are chosen.
+    /// Replaces the sections whose names are `chosen` by those of another recipe.
     pub fn replace(&mut self, other: &Self, chosen: impl Fn(&str) -> bool) {
         macro_rules! take {
             ($($section:ident),*) => {
@@ -119,8 +119,8 @@ impl Recipe {
         );
     }
 
-    /// The JSON schema of recipes. A bound of a number is that of a plain value: a distribution may reach beyond it where
-    /// its `min` and `max` do not.
+    /// Returns the JSON schema of recipes. The bounds of a number apply to a plain value, and to a distribution after its `min`
+    /// and `max`.
     #[must_use]
     pub fn schema() -> serde_json::Value {
         schemars::schema_for!(Self).to_value()

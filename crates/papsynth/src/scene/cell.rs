@@ -1,4 +1,4 @@
-//! An epithelial cell of a scene, its numbers drawn.
+//! An epithelial cell of a scene, with drawn numbers.
 
 use dye_spectra::Amounts;
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 pub use crate::recipe::specimen::CellDetail;
 use crate::words::words;
 
-/// An epithelial cell, its numbers drawn.
+/// An epithelial cell, with drawn numbers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CellBody {
@@ -14,107 +14,107 @@ pub struct CellBody {
     pub class: String,
     /// Radius of the cell (of the circle of its first descriptor), µm.
     pub radius_um: f64,
-    /// Mean absorbance of its cytoplasm: the strength of its stain.
+    /// Mean absorbance of the cytoplasm.
     pub cytoplasm_absorbance: f64,
-    /// The tint of its cytoplasm.
+    /// Tint of the cytoplasm.
     pub tint: Tint,
-    /// Dyes of its cytoplasm where it is stained with strength 1.
+    /// Dyes of the cytoplasm at staining strength 1.
     pub dyes: Amounts,
-    /// How late light comes through its flat sheet, radians.
+    /// Phase delay of the flat sheet, radians.
     pub phase_rad: f64,
-    /// Strengths of the cytoplasm's detail.
+    /// Detail of the cytoplasm.
     pub detail: CellDetail,
-    /// The cleared space round its nucleus.
+    /// Cleared space around the nucleus.
     pub halo: Option<Halo>,
-    /// The part that lies doubled back.
+    /// Fold.
     pub fold: Option<Fold>,
-    /// Its nucleus.
+    /// Nucleus.
     pub nucleus: NucleusBody,
 }
 
 impl CellBody {
-    /// How far it may reach from its middle, µm.
+    /// Returns the maximum radius, µm.
     pub(crate) fn reach_um(&self) -> f64 {
-        /// In radii; of cells of the default model hardly one in a thousand reaches 1.75.
+        /// In radii. About one cell of the default model in a thousand exceeds 1.75.
         const REACH: f64 = 1.9;
         REACH * self.radius_um
     }
 }
 
-/// The cleared space round the nucleus of a koilocyte.
+/// The cleared space around the nucleus of a koilocyte.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Halo {
-    /// Its radius, µm.
+    /// Radius, µm.
     pub radius_um: f64,
-    /// Share of the cytoplasm that is missing there.
+    /// Fraction of the cytoplasm that is missing there.
     pub clearing: f64,
-    /// How much denser the cytoplasm is at its edge.
+    /// Additional density of the cytoplasm at its edge, relative to the rest.
     pub rim: f64,
 }
 
-/// A part of a cell that lies doubled back on it.
+/// A fold: a part of a cell folded back on it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fold {
-    /// What becomes of the part beyond the crease.
+    /// Form of the fold.
     pub form: FoldForm,
-    /// Direction from the cell's middle to the crease, degrees.
+    /// Direction from the centre of the cell to the crease, degrees.
     pub direction_deg: f64,
     /// Distance of the crease from the rim, as a fraction of the radius.
     pub depth: f64,
-    /// Radius of the bend, µm.
+    /// Bending radius, µm.
     pub radius_um: f64,
 }
 
-/// What becomes of the part of a cell beyond a crease.
+/// Form of a fold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FoldForm {
-    /// It lies flat on the cell.
+    /// A flap, flat on the cell.
     Flap,
-    /// It is rolled up.
+    /// A rolled rim.
     Roll,
-    /// Both sides are folded to the middle.
+    /// Both sides folded to the centre.
     FoldedOver,
 }
 
-/// The nucleus of a cell, its numbers drawn.
+/// The nucleus of a cell, with drawn numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NucleusBody {
     /// Radius (of the circle of its first descriptor), µm.
     pub radius_um: f64,
-    /// Where it lies, as a fraction of the cell's radius from its middle.
+    /// Place relative to the centre of the cell, as a fraction of the radius of the cell.
     pub off_centre: [f64; 2],
-    /// Direction of its long axis against the cell's, degrees.
+    /// Direction of the long axis relative to that of the cell, degrees.
     pub rotation_deg: f64,
-    /// Mean absorbance above the cytoplasm: the strength of its stain.
+    /// Mean absorbance in addition to the cytoplasm.
     pub absorbance: f64,
-    /// Its dyes where it is stained with strength 1.
+    /// Dyes at staining strength 1.
     pub dyes: Amounts,
-    /// Standard deviation of the absorbance inside.
+    /// Standard deviation of the absorbance.
     pub texture: f64,
     /// Absorbance of the rim relative to the nucleus.
     pub rim: f64,
-    /// Share of its thickness that is domed: 0 of a plate, 1 of an ellipsoid.
+    /// Fraction of the thickness that is domed: 0 is a plate, 1 an ellipsoid.
     pub dome: f64,
-    /// Standard deviation of the fall of its thickness about its outline, µm.
+    /// Standard deviation of the falloff of the thickness at the outline, µm.
     pub edge_um: f64,
-    /// Part of the variance of its chromatin that is coarse.
+    /// Fraction of the variance of chromatin that is coarse.
     pub clumping: f64,
-    /// How much thicker it is at its rim than in its middle, to the right and below.
+    /// Relative change of the thickness over a radius to the right and downwards.
     pub thickness_gradient: [f64; 2],
-    /// Small, dark, without structure.
+    /// Whether it is pyknotic: small, dark, without structure.
     pub pyknotic: bool,
-    /// Strength of wrinkles, 0 if it has none.
+    /// Amplitude of wrinkles, 0 if it has none.
     pub wrinkle: f64,
-    /// Nucleoli.
+    /// Number of nucleoli.
     pub nucleoli: usize,
 }
 
 words! {
-    /// The tint that a cytoplasm has taken.
+    /// Tint of cytoplasm.
     #[derive(Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Tint {

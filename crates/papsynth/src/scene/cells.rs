@@ -1,4 +1,4 @@
-//! Drawing epithelial cells: places, sizes, stains, folds.
+//! Draws epithelial cells: places, sizes, stains, folds.
 
 use std::collections::BTreeMap;
 
@@ -30,10 +30,10 @@ pub(super) struct Cells {
     pub(super) counts: BTreeMap<String, ClassCount>,
 }
 
-/// What happens to cells that find no place.
+/// Handling of cells without a place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Crowding {
-    /// An error.
+    /// They are an error.
     Error,
     /// They are left out.
     LeaveOut,
@@ -82,7 +82,7 @@ pub(super) fn draw_cells(
                 place => place?,
             };
             let depth_um = relief.at(place.centre_um);
-            objects.push(cell.lie(kind, number, &place, depth_um));
+            objects.push(cell.placed(kind, number, &place, depth_um));
         }
         groups_begun = groups.begun();
         let placed = &objects[before..];
@@ -93,36 +93,33 @@ pub(super) fn draw_cells(
     Ok(Cells { objects, field: weights.field, region: weights.region, counts })
 }
 
-/// Returns how many cells of each class to place: those requested, or fewer of each class where they cannot fit.
+/// Returns how many cells of each class to place: those requested, or the same fraction of each class where they do not fit.
 fn fitting(recipe: &Recipe, places: &Places, requested: &[usize], crowding: Crowding) -> Result<Vec<usize>, Cause> {
-    let mut wanted = requested.to_vec();
-    for in_margin in [false, true] {
-        // Of a group only the first cell keeps its distance.
-        let first = |(mix, count): (&CellMix, &usize)| match mix.group.form {
+    /// Fraction of the cells that fit which is placed in a crowded field, so that each class gets places.
+    const CROWDED: f64 = 0.9;
+    let mut counts = [0; 2];
+    for (mix, count) in recipe.cells.values().zip(requested) {
+        // Only the first cell of a group keeps its distance.
+        counts[usize::from(mix.count.is_density())] += match mix.group.form {
             GroupForm::Single => *count,
             _ => random::count((*count as f64 / mix.group.size.mean_count().max(1.0)).ceil()),
         };
-        let of_area = |mix: &CellMix| mix.count.is_density() == in_margin;
-        let cells = recipe.cells.values().zip(requested).filter(|(mix, _)| of_area(mix));
-        let count: usize = cells.map(first).sum();
-        if count < 2 {
-            continue;
-        }
-        places.check_tries(count, in_margin)?;
-        match places.check(count, in_margin) {
-            Ok(()) => {}
-            Err(cause) if crowding == Crowding::Error => return Err(cause),
-            Err(_) => {
-                let fraction = places.room(in_margin) / count as f64;
-                for (mix, wanted) in recipe.cells.values().zip(&mut wanted) {
-                    if of_area(mix) {
-                        *wanted = random::count((*wanted as f64 * fraction).ceil());
-                    }
-                }
-            }
-        }
     }
-    Ok(wanted)
+    let [in_field, in_both] = counts;
+    for (count, in_margin) in [(in_field, false), (in_both, true)] {
+        places.check_tries(count, in_margin)?;
+    }
+    if in_field + in_both < 2 {
+        return Ok(requested.to_vec());
+    }
+    match places.check(in_field, in_both) {
+        Err(fraction) if crowding == Crowding::LeaveOut => {
+            let fewer = |count: &usize| random::count((*count as f64 * CROWDED * fraction).ceil());
+            Ok(requested.iter().map(fewer).collect())
+        }
+        Err(_) => Err(places.no_room(in_field, in_both)),
+        Ok(()) => Ok(requested.to_vec()),
+    }
 }
 
 /// A class of cells of a recipe.
@@ -133,17 +130,17 @@ pub(super) struct Class<'a> {
     pub(super) class: &'a CellClass,
 }
 
-/// A cell that has no place yet.
+/// A drawn cell without a place.
 pub(super) struct Drawn {
     pub(super) body: CellBody,
-    /// The direction it is turned to if nothing else says so, degrees.
+    /// Direction of a single cell, degrees.
     any_deg: f64,
-    /// Its depth about the relief, µm.
+    /// Depth relative to the relief, µm.
     stacking_um: f64,
 }
 
 impl Drawn {
-    /// The cell of that number.
+    /// Draws the cell with this number.
     pub(super) fn new(recipe: &Recipe, kind: Class<'_>, stain: &FieldStain<'_>, key: Key, number: u64) -> Self {
         let own = |purpose: &str| key.stream("cell", number, purpose);
         let mut rng = own("body");
@@ -153,8 +150,8 @@ impl Drawn {
         Self { body, any_deg, stacking_um }
     }
 
-    /// The cell at its place, where the relief is so deep.
-    pub(super) fn lie(self, kind: Class<'_>, number: u64, place: &Place, depth_um: f64) -> Object {
+    /// Returns the cell at its place, with the depth of the relief there.
+    pub(super) fn placed(self, kind: Class<'_>, number: u64, place: &Place, depth_um: f64) -> Object {
         let Self { mut body, any_deg, stacking_um } = self;
         let rotation_deg = if place.group == 0 { any_deg } else { place.rotation_deg };
         body.nucleus.off_centre = polar(body.nucleus.off_centre, kind.class.nucleus.polarity, rotation_deg);
@@ -173,7 +170,7 @@ impl Drawn {
     }
 }
 
-/// Turns a displacement towards one end of the cell's long axis: all the way at polarity 1.
+/// Rotates a displacement towards one end of the long axis of the cell: completely at polarity 1.
 fn polar(off_centre: [f64; 2], polarity: f64, rotation_deg: f64) -> [f64; 2] {
     if polarity <= 0.0 {
         return off_centre;
@@ -193,14 +190,14 @@ fn draw_body(
 ) -> CellBody {
     let size = mix.size.draw(rng);
     let (cytoplasm, nucleus) = (&class.cytoplasm, &class.nucleus);
-    // Radii of cell and nucleus vary together: a bivariate normal of their logarithms.
+    // The logarithms of the radii of cell and nucleus have a bivariate normal distribution.
     let first = random::normal(rng);
     let second = random::normal(rng);
     let correlation = nucleus.size_correlation;
     let partner = correlation * first + (1.0 - correlation * correlation).max(0.0).sqrt() * second;
     let radius_um = size * cytoplasm.radius_um.median * libm::exp(cytoplasm.radius_um.log_sd * first);
     let mut nucleus_um = size * nucleus.radius_um.median * libm::exp(nucleus.radius_um.log_sd * partner);
-    /// A nucleus wider than this share of its cell would stand out of it.
+    /// Largest radius of a nucleus relative to its cell: a larger one extends beyond the cell.
     const WIDEST: f64 = 0.72;
     nucleus_um = nucleus_um.min(WIDEST * radius_um);
     let cytoplasm_absorbance = cytoplasm.absorbance.median
@@ -210,7 +207,7 @@ fn draw_body(
     let detail = draw_detail(recipe, cytoplasm.pliability, rng, &own);
     let fold = draw_fold(recipe, cytoplasm.pliability, rng);
     let distance = (nucleus.off_centre.mean + nucleus.off_centre.sd * random::normal(rng)).clamp(0.0, 1.0);
-    // However far off its centre, the nucleus stays inside the cell.
+    // The nucleus stays inside the cell.
     let distance = distance.min((0.85 - nucleus_um / radius_um).max(0.0));
     let angle = random::direction(rng);
     let pyknotic = random::chance(recipe.nucleus.pyknotic.draw(rng), rng);
@@ -218,7 +215,7 @@ fn draw_body(
     let nucleus_absorbance = normal_at_least(nucleus.absorbance.mean, nucleus.absorbance.sd, 0.25, rng)
         * stain.nucleus
         * mix.nucleus_stain.draw(rng);
-    // Chromatin that takes up more stain varies more: what is typical of a class is the contrast, sd over mean.
+    // Darker chromatin varies more: the contrast, sd over mean, is typical of a class.
     let contrast = normal_at_least(nucleus.chromatin.sd.mean, CONTRAST_SPREAD * nucleus.chromatin.sd.sd, 0.3, rng)
         / nucleus.absorbance.mean.max(f64::MIN_POSITIVE);
     let own_number = |(name, number): (&str, &Number)| number.draw(&mut own(name));
@@ -241,7 +238,7 @@ fn draw_body(
         },
         pyknotic,
         wrinkle: if wrinkled { random::between(0.3, 1.0, rng) } else { 0.0 },
-        // About as many as there are on average, one more or less.
+        // The mean number, one more or less.
         nucleoli: random::count(
             nucleus.nucleoli + random::between(-1.0, 1.0, &mut own("nucleoli")) * nucleus.nucleoli.min(1.0),
         ),
@@ -268,10 +265,10 @@ fn draw_body(
     }
 }
 
-/// Share of the spread of chromatin's standard deviation that is left when the absorbance is known.
+/// Fraction of the variation of the standard deviation of chromatin that is independent of the absorbance.
 const CONTRAST_SPREAD: f64 = 0.6;
 
-/// A normal cut off below a share of its mean, so that no stain vanishes or turns negative.
+/// Draws from a normal distribution, cut below a fraction of its mean, so that stains stay above 0.
 fn normal_at_least(mean: f64, sd: f64, share: f64, rng: &mut Stream) -> f64 {
     (mean + sd * random::normal(rng)).max(share * mean)
 }
@@ -304,7 +301,7 @@ fn draw_detail(recipe: &Recipe, pliability: f64, rng: &mut Stream, own: &impl Fn
 }
 
 fn draw_halo(halo: Option<&HaloStatistics>, nucleus_um: f64, cell_um: f64, rng: &mut Stream) -> Option<Halo> {
-    /// Largest halo relative to its cell: a ring of cytoplasm is left outside it.
+    /// Largest radius of a halo relative to its cell: a ring of cytoplasm remains outside.
     const LARGEST: f64 = 0.8;
     let halo = halo.filter(|halo| random::chance(halo.probability, rng))?;
     let radius = halo.radius.median * libm::exp(halo.radius.log_sd * random::normal(rng));
@@ -333,9 +330,9 @@ fn draw_fold(recipe: &Recipe, pliability: f64, rng: &mut Stream) -> Option<Fold>
     } else {
         return None;
     };
-    /// A rolled rim takes in less of the cell than a flap.
+    /// Depth of a rolled rim relative to that of a flap.
     const ROLLED: f64 = 0.45;
-    /// Each side of a cell that is folded over is folded in from about half of the radius.
+    /// Each side of a cell that is folded over is folded at half the radius.
     const FOLDED_OVER: f64 = 0.5;
     let depth = match form {
         FoldForm::Flap => depth,

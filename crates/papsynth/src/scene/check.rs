@@ -8,20 +8,20 @@ use super::field::{Object, Scene};
 use crate::debris::{Body, NucleusForm};
 use crate::error::{Cause, Error, within};
 
-/// Most objects, planes and pixels of a scene.
+/// Largest number of objects, planes and pixels of a scene.
 const MOST_OBJECTS: usize = 1 << 20;
 const MOST_PLANES: usize = 1024;
 const MOST_PIXELS: usize = 1 << 30;
 
-/// How far an object may reach from its middle, in points of the grid on which it is rendered.
+/// Largest radius of an object, in points of the grid on which it is rendered.
 const FARTHEST_POINTS: f64 = 8192.0;
 
-/// How many times that its middle may lie from the corner of the image.
+/// Largest distance of its centre from the corner of the image, in such radii.
 const MOST_REACHES: f64 = 512.0;
 
-/// The range of each number, by the name of its field or by the end of its path. Of lists it is that of each number.
+/// Range of each number, by the name of its field or by the end of its path. For lists it applies to each number.
 ///
-/// The ranges are wider than those of recipes: they keep memory, time and arithmetic within bounds.
+/// The ranges are wider than those of recipes. They limit memory and time.
 #[rustfmt::skip]
 const RANGES: &[(&str, f64, f64)] = &[
     ("view.width", 1.0, 32_768.0), ("view.height", 1.0, 32_768.0), ("pixel_um", 0.04, 5.0),
@@ -53,14 +53,14 @@ const RANGES: &[(&str, f64, f64)] = &[
     ("nucleoli", 0.0, 100.0), ("body.rim", 1e-3, 10.0), ("rim", 0.0, 100.0), ("body.width", 0.05, 10.0),
     ("elongation", 0.1, 100.0), ("alpha", 0.0, 1.0), ("beta", 0.0, 2.0), ("waves", 0.0, 10.0), ("pallor", 0.0, 1.0),
     ("granularity", 0.0, 20.0), ("ragged", 0.0, 10.0), ("branches", 0.0, 1.0), ("buds", 0.0, 1.0),
-    ("density", 0.0, 100.0), ("coverage", 0.0, 1.0), ("excess_area", 1.0, 4.0), ("angularity", 0.0, 1.0), ("wrinkle", 0.0, 100.0),
+    ("density", 0.0, 100.0), ("coverage", 0.0, 1.0), ("excess_area", 1.0, 4.0), ("angularity", 0.0, 1.0), ("wrinkle", 0.0, 100.0), ("wrinkle_thickness", 0.0, 100.0),
     ("endoplasm", 0.0, 100.0), ("clouds", 0.0, 100.0), ("flecks", 0.0, 100.0), ("flecks_threshold", 0.0, 1.0),
     ("cytoskeleton", 0.0, 100.0), ("grain", 0.0, 100.0), ("granules", 0.0, 1e4), ("thickness_gradient", -100.0, 100.0),
     ("clearing", 0.0, 1.0), ("depth", 0.0, 2.0), ("dome", 0.0, 1.0), ("clumping", 0.0, 1.0), ("off_centre", -10.0, 10.0),
 ];
 
 impl Scene {
-    /// The scene as JSON, one object a line.
+    /// Returns the scene as JSON, one object per line.
     ///
     /// # Panics
     /// Never: strings, numbers and lists can be written as JSON.
@@ -75,10 +75,10 @@ impl Scene {
         text + "\n" + &objects.join(",\n") + "\n]}\n"
     }
 
-    /// Reads a scene that [`to_json`](Self::to_json) or another program wrote, and checks it.
+    /// Reads and checks a scene written by [`to_json`](Self::to_json) or by another program.
     ///
     /// # Errors
-    /// If a field is missing, not known, of another type or out of range: the object and the field, and what is accepted.
+    /// If a field is missing, unknown, of a wrong type or out of range: the object, the field, and what is accepted.
     pub fn from_json(text: &str) -> Result<Self, Error> {
         read(text).map_err(Error::Scene)
     }
@@ -124,7 +124,7 @@ fn object(value: Value, pixel_um: f64, farthest_um: f64, ids: &mut BTreeSet<u32>
     if reach_um > farthest_um {
         return Err(Cause::Reach(reach_um, farthest_um));
     }
-    // Round leukocytes are drawn without lobes and without a size of their cytoplasm.
+    // Round leukocytes have no lobes and no cytoplasm.
     if let Body::Leukocyte(cell) = &object.body
         && cell.form == NucleusForm::Lobed
     {
@@ -213,18 +213,22 @@ mod tests {
         };
         let at = |field: &str| format!("/objects/{cell}/{field}");
         for (pointer, to, said) in [
-            ("/view/width".to_owned(), 1e9.into(), "view.width: 1000000000 is outside 1 to 32768"),
-            ("/camera/bits".to_owned(), 60.into(), "camera.bits: 60 is outside 8 to 16"),
-            ("/planes_um".to_owned(), Value::Array(Vec::new()), "planes_um: 0 is outside 1 to 1024"),
+            ("/view/width".to_owned(), 1e9.into(), "view.width: 1000000000 is out of range: expected 1 to 32768"),
+            ("/camera/bits".to_owned(), 60.into(), "camera.bits: 60 is out of range: expected 8 to 16"),
+            ("/planes_um".to_owned(), Value::Array(Vec::new()), "planes_um: 0 is out of range: expected 1 to 1024"),
             ("/objects".to_owned(), 3.into(), "objects"),
-            (at("body/radius_um"), Value::from(-1.0), "body.radius_um: -1 is outside"),
-            (at("body/radius_um"), Value::from(4e3), "reaches"),
-            (at("body/radius_um"), "wide".into(), "body.radius_um: \"wide\" is not a number"),
+            (at("body/radius_um"), Value::from(-1.0), "body.radius_um: -1 is out of range"),
+            (at("body/radius_um"), Value::from(4e3), "the radius of the object is"),
+            (at("body/radius_um"), "wide".into(), "body.radius_um: expected a number, found \"wide\""),
             (at("body/tint"), "green".into(), "unknown variant `green`"),
             (at("body/kind"), "dragon".into(), "unknown variant `dragon`"),
             (at("body/dyes"), Value::from(vec![1.0]), "invalid length 1"),
-            (at("body/detail/notches"), 1e9.into(), "body.detail.notches: 1000000000 is outside 0 to 100"),
-            (at("id"), 0.into(), "id: 0 is outside 1"),
+            (
+                at("body/detail/notches"),
+                1e9.into(),
+                "body.detail.notches: 1000000000 is out of range: expected 0 to 100",
+            ),
+            (at("id"), 0.into(), "id: 0 is out of range: expected 1"),
         ] {
             let message = refused(&pointer, to);
             assert!(message.contains(said), "{pointer}: {message}");

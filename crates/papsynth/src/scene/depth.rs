@@ -1,8 +1,8 @@
-//! How depth varies over a slide: "a median filtered Perlin noise image, scaled to encompass the desired depth".
+//! The variation of depth over a field: "a median filtered Perlin noise image, scaled to encompass the desired depth".
 
 use perlin_bg::{Fractal, FractalParams};
 
-/// Depth at every place of a field.
+/// Depth of the places of a field.
 #[derive(Debug, Clone)]
 pub(crate) struct Relief {
     width: usize,
@@ -12,10 +12,10 @@ pub(crate) struct Relief {
 }
 
 impl Relief {
-    /// A relief of `depth_um` over a field of `size_um`, from Perlin noise with cells of `relief_um` behind a median
+    /// Returns a relief with a range of `depth_um` over a field of `size_um`: Perlin noise with cells of `relief_um`, after a median
     /// filter of `median_um`.
     pub(crate) fn new(size_um: [f64; 2], depth_um: f64, relief_um: f64, median_um: f64, key: u64) -> Self {
-        /// Samples to a cell of the noise: enough for linear interpolation between them.
+        /// Samples per cell of the noise, for linear interpolation.
         const SAMPLES: f64 = 8.0;
         let pitch_um = relief_um / SAMPLES;
         let samples = |length: f64| crate::random::count((length / pitch_um).ceil()) + 2;
@@ -29,7 +29,7 @@ impl Relief {
             }
         }
         let mut depths = median(&raw, width, crate::random::count(median_um / pitch_um / 2.0));
-        // Scaled to encompass the depth asked for, centred on the middle of the slide.
+        // Scaled to the range of depth, about the centre of the slide.
         let (low, high) = depths.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
         let scale = if high > low { depth_um / (high - low) } else { 0.0 };
         for depth in &mut depths {
@@ -38,7 +38,7 @@ impl Relief {
         Self { width, height, pitch_um, depths }
     }
 
-    /// Depth at a place, µm.
+    /// Returns the depth at a place, µm. Outside the field it is that of the nearest place of the field.
     pub(crate) fn at(&self, place_um: [f64; 2]) -> f64 {
         let grid = |value: f64, count: usize| {
             let position = (value / self.pitch_um).clamp(0.0, (count - 1) as f64);
@@ -53,7 +53,7 @@ impl Relief {
     }
 }
 
-/// Median over squares of 2·radius + 1, cut off at the border.
+/// Returns the median over squares of 2·radius + 1, cropped at the border.
 fn median(values: &[f64], width: usize, radius: usize) -> Vec<f64> {
     let height = values.len() / width;
     let mut window = Vec::new();

@@ -1,4 +1,4 @@
-//! From recipe and key to a scene. No pixel is touched here.
+//! Draws a scene from a recipe and a key.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use crate::key::Key;
 use crate::model::Model;
 use crate::random;
 use crate::recipe::section::named;
-use crate::recipe::{Abundance, FocusOutput, Illumination, Light, Optics, Recipe};
+use crate::recipe::{Abundance, FocusOutput, Illumination, LightSection, Optics, Recipe};
 
 use super::cells::{Cells, Crowding, draw_cells};
 use super::field::{Object, Scene};
@@ -21,10 +21,10 @@ use super::weight::WeightMap;
 /// Number of draws of the objects of a field before cells that do not fit are left out.
 pub const MAX_ATTEMPTS: u32 = 8;
 
-/// Draws what lies on the slide and how it is imaged.
+/// Draws the objects of a field and how it is imaged.
 ///
-/// `weight_map` is what the layout's `path` names, if it names a file. If the cells do not fit, the objects are drawn again, up to
-/// [`MAX_ATTEMPTS`] times; then as many are placed as fit.
+/// `weight_map` is the image at the `path` of the layout, if it has one. If the cells do not fit, the objects are drawn again, up to
+/// [`MAX_ATTEMPTS`] times; the last time as many cells are placed as fit.
 ///
 /// # Errors
 /// If no draw can succeed: the weight map is missing or too uneven, or there are more objects than labels can number.
@@ -73,8 +73,8 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
     Ok(Scene { objects, slide, attempts: attempt + 1, cells: counts, ..empty(recipe, view, &field, &stain) })
 }
 
-/// Gives the cells of a field their coats, and adds everything that lies among them, in the field or in the field with its
-/// margin. `sieve` says what of it lies on a part of a slide.
+/// Draws the coats of the clue cells, and adds the debris, in the field or in the field with its margin. `plot_density` selects the objects
+/// of a part of a slide.
 pub(super) fn strew(
     debris: &Debris,
     [field, region]: [Region; 2],
@@ -110,12 +110,12 @@ pub(super) fn strew(
     }));
 }
 
-/// The number of the slide that an image shows.
+/// Returns the number of the slide of an image.
 fn slide_of(recipe: &Recipe, key: Key) -> u64 {
     key.index / recipe.slide.fields_per_slide.max(1) as u64
 }
 
-/// The view without anything on it: how it is imaged.
+/// Returns the scene without objects.
 pub(super) fn empty(recipe: &Recipe, view: View, field: &FieldNumbers, stain: &FieldStain<'_>) -> Scene {
     let (planes_um, fusion) = planes(recipe, field);
     Scene {
@@ -149,7 +149,7 @@ pub(super) fn pixel_um(recipe: &Recipe, field: &FieldNumbers) -> f64 {
     field.draw(named!(recipe.camera.pixel_um)) * binning as f64 / magnification
 }
 
-/// Travel of the stage to each plane; of planes that are fused to the middle one, and how they are fused.
+/// Returns the positions of the planes; for an EDF image the central position, and the planes that are fused.
 fn planes(recipe: &Recipe, field: &FieldNumbers) -> (Vec<f64>, Option<Fusion>) {
     let focus = recipe.focus.draw("focus", |path| field.stream(path));
     let middle = f64::from(focus.planes - 1) / 2.0;
@@ -169,11 +169,11 @@ fn planes(recipe: &Recipe, field: &FieldNumbers) -> (Vec<f64>, Option<Fusion>) {
 
 fn light(recipe: &Recipe, field: &FieldNumbers) -> SceneLight {
     match &recipe.light {
-        Light::Monochrome(light) => SceneLight::Monochrome {
+        LightSection::Monochrome(light) => SceneLight::Monochrome {
             wavelength_um: field.draw(named!("light", light.wavelength_um)),
             bandwidth_um: field.draw(named!("light", light.bandwidth_um)),
         },
-        Light::Colour(light) => SceneLight::Colour {
+        LightSection::Colour(light) => SceneLight::Colour {
             lamp_k: field.draw(named!("light", light.lamp_k)),
             mixing: light.mixing,
             chromatic_um: field.draw(named!("light", light.chromatic_um)),

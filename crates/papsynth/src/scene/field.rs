@@ -1,4 +1,4 @@
-//! One field of view: how it is imaged and what lies in it.
+//! A field of view: its objects and how it is imaged.
 
 use std::collections::BTreeMap;
 
@@ -10,34 +10,33 @@ use crate::debris::{Body, Coat};
 use crate::key::{Key, Stream};
 use crate::recipe::camera::SceneCamera;
 
-/// One field of view: how it is imaged and what lies in it.
+/// A field of view: its objects and how it is imaged.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// Seed and index the scene was drawn from.
     pub key: Key,
-    /// Number of the slide that the field is part of.
+    /// Number of the slide of the field.
     pub slide: u64,
     /// The image and its pixels.
     pub view: View,
-    /// Travel of the stage to each focal plane, µm, in the order of the stack; larger where what is nearer to the objective
-    /// is in focus.
+    /// Position of the stage at each focal plane, µm, in the order of the stack. Larger values focus nearer to the objective.
     pub planes_um: Vec<f64>,
-    /// The planes that are fused to one picture of extended focus, if it is one: `planes_um` then holds their middle.
+    /// The planes that are fused to an EDF image, if it is one: `planes_um` then has their centre.
     pub fusion: Option<Fusion>,
-    /// The empty slide.
+    /// Light of the empty slide.
     pub background: SceneBackground,
-    /// The light.
+    /// Light.
     pub light: SceneLight,
-    /// How it spreads.
+    /// Optics.
     pub optics: SceneOptics,
-    /// What happens to nuclei whose donors were images already.
+    /// Restoration of nuclei whose donors are images.
     pub restoration: Restoration,
-    /// What stains everything that is no epithelial cell.
+    /// Dyes of debris.
     pub dyes: SceneDyes,
-    /// The camera.
+    /// Camera.
     pub camera: SceneCamera,
-    /// Which frame of a whole slide it is, if it is one.
+    /// The frame of a whole slide, if it is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frame: Option<SlideFrame>,
     /// Number of times that the objects were drawn: more than 1 if the cells of the first draws did not fit.
@@ -46,13 +45,13 @@ pub struct Scene {
     /// Number of cells, by class.
     #[serde(default)]
     pub cells: BTreeMap<String, ClassCount>,
-    /// Every object, by id.
+    /// Objects, by id.
     pub objects: Vec<Object>,
 }
 
 /// Number of cells of a class in a field.
 ///
-/// Cells whose `count` is a density also lie in a margin of 60 µm round the field, from which they reach into the image.
+/// Cells whose `count` is a density also have centres in a margin of 60 µm around the field, so that they reach into the image.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClassCount {
@@ -72,47 +71,47 @@ fn one() -> u32 {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SlideFrame {
-    /// Its number on the slide.
+    /// Number on the slide.
     pub number: u32,
-    /// The pixel of the slide that its first pixel is.
+    /// Pixel of the slide at its first pixel.
     pub origin_px: [i64; 2],
 }
 
-/// The square of a whole slide that an object was drawn with.
+/// The plot of a whole slide in which an object was drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plot {
-    /// Its number on the slide.
+    /// Number on the slide.
     pub number: u32,
-    /// Where its first pixel lies, in pixels from that of the image.
+    /// Position of its first pixel, in pixels from the first pixel of the image.
     pub at_px: [i64; 2],
 }
 
-/// One thing on the slide.
+/// An object on the slide.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Object {
     /// Id within the image, from 1.
     pub id: u32,
-    /// Its number within its kind, from 0: what its streams are named by.
+    /// Number within its kind, from 0: part of the names of its streams.
     pub number: u64,
-    /// The cluster it was placed with, from 1; 0 if alone.
+    /// Cluster or group, from 1; 0 for single objects.
     pub cluster: u32,
-    /// The square of the slide it was drawn with, of an object on a whole slide.
+    /// Plot in which it was drawn, for an object of a whole slide.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plot: Option<Plot>,
-    /// Place of its middle, µm from the upper left corner of the image, or of its plot.
+    /// Centre, µm from the upper left corner of the image, or of its plot.
     pub centre_um: [f64; 2],
     /// Depth, µm, positive towards the objective.
     pub depth_um: f64,
-    /// Direction it is turned to, degrees.
+    /// Direction, degrees.
     pub rotation_deg: f64,
-    /// Category of the Bethesda system, of a cell whose class has one; else empty.
+    /// Category of the Bethesda system, of a cell whose class has one; otherwise empty.
     pub bethesda: String,
-    /// The bacteria that cover it, if it is a clue cell.
+    /// Bacteria on the cell, if it is a clue cell.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coat: Option<Coat>,
-    /// What it is.
+    /// The object and its drawn numbers.
     pub body: Body,
 }
 
@@ -123,14 +122,14 @@ impl Scene {
         self.cells.values().map(|count| count.requested.saturating_sub(count.placed)).sum()
     }
 
-    /// The grid on which the slide is rendered: that of the image, or a finer one.
+    /// Returns the grid on which the slide is rendered: that of the image, or a finer one.
     #[must_use]
     pub fn grid(&self) -> View {
         let n = self.oversampling();
         View { width: self.view.width * n, height: self.view.height * n, pixel_um: self.view.pixel_um / n as f64 }
     }
 
-    /// Samples of the slide along the side of a pixel.
+    /// Returns the oversampling: samples of the slide along the side of a pixel.
     #[must_use]
     pub fn oversampling(&self) -> usize {
         match &self.optics {
@@ -139,17 +138,16 @@ impl Scene {
         }
     }
 
-    /// The grid that cytoplasm is made on: the camera's pixels where these are fine enough for wrinkles, else the slide's
-    /// grid.
+    /// Returns the grid of cytoplasm: that of the image if it is fine enough for wrinkles, otherwise that of the slide.
     pub(crate) fn sheet_grid(&self) -> View {
-        /// A Gaussian crest of σ that is sampled every p changes by 2·exp(−2π²σ²/p²) with where it falls: not at all at σ = .34 µm, that of
-        /// the default's middle; by a twentieth at σ = .11 µm, its narrowest, and p = .25 µm, by a quarter at .33 µm.
+        /// The maximum of a sampled Gaussian varies by 2·exp(−2π²σ²/p²) with its position, for samples at distance p: by nothing at
+        /// σ = .34 µm, the centre of the default; at σ = .11 µm, its minimum, by 5 % for p = .25 µm and by 25 % for p = .33 µm.
         const COARSEST_UM: f64 = 0.35;
         if self.view.pixel_um <= COARSEST_UM { self.view } else { self.grid() }
     }
 
-    /// The depth that is in focus at a travel of the stage, µm. Light bends at the cover glass: with a dry lens the focus
-    /// goes 1.5 times as deep as the stage.
+    /// Returns the depth in focus at a position of the stage, µm. Because of refraction at the cover glass, it is 1.5 times the
+    /// position with a dry lens.
     #[must_use]
     pub fn in_focus_um(&self, plane_um: f64) -> f64 {
         match &self.optics {
@@ -158,37 +156,37 @@ impl Scene {
         }
     }
 
-    /// Travel of the stage at which an object of a depth is seen in a plane: the plane's own or, where planes were fused, that
-    /// of the one which shows the object sharpest.
+    /// Returns the position of the stage at which an object of a depth is imaged in a plane: that of the plane or, in an EDF image,
+    /// that of the sharpest plane of the object.
     #[must_use]
     pub fn seen_at_um(&self, plane_um: f64, depth_um: f64) -> f64 {
-        // Depth and travel are proportional.
+        // Depth and position are proportional.
         self.fusion.map_or(plane_um, |fusion| fusion.nearest_um(depth_um / self.in_focus_um(1.0)))
     }
 
-    /// The stream of a purpose of one object.
+    /// Returns the stream of a purpose of an object.
     pub(crate) fn stream(&self, kind: &str, object: &Object, purpose: &str) -> Stream {
         self.key_of(object).stream(kind, object.number, purpose)
     }
 
-    /// The key of an object's streams: that of the scene, or of the plot it was drawn with.
+    /// Returns the key of the streams of an object: that of the scene, or of its plot.
     pub(crate) fn key_of(&self, object: &Object) -> Key {
         object.plot.map_or(self.key, |plot| self.key.plot(plot.number))
     }
 
-    /// The key of what belongs to the whole image.
+    /// Returns the key of the streams of the complete image.
     pub(crate) fn own_key(&self) -> Key {
         self.frame.map_or(self.key, |frame| self.key.frame(frame.number))
     }
 
-    /// Place of an object's middle, µm from the image's upper left corner.
+    /// Returns the centre of an object, µm from the upper left corner of the image.
     #[must_use]
     pub fn place_um(&self, object: &Object) -> [f64; 2] {
         let corner = object.plot.map_or([0; 2], |plot| plot.at_px);
         [0, 1].map(|axis| object.centre_um[axis] + corner[axis] as f64 * self.view.pixel_um)
     }
 
-    /// Channels of the image: 1 or 3.
+    /// Returns the number of channels: 1 or 3.
     #[must_use]
     pub fn channels(&self) -> usize {
         match self.light {

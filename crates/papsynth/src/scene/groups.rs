@@ -1,4 +1,4 @@
-//! How cells of a class lie together: alone, in heaps, honeycombs and palisades.
+//! The grouping of cells of a class: single cells, aggregates, honeycombs and palisades.
 
 use rand_core::Rng;
 
@@ -6,67 +6,68 @@ use crate::key::Stream;
 use crate::random;
 use crate::recipe::{Group, GroupForm};
 
-/// How far a cell of a honeycomb or a palisade lies off its place, relative to the distance of neighbours.
+/// Standard deviation of the place of a cell in a honeycomb or a palisade, relative to the distance of neighbours.
 const JITTER: f64 = 0.08;
 
-/// How much the row of a palisade bends at most over its length, radians.
+/// Largest bend of a palisade over its length, radians.
 const BEND: f64 = 0.9;
 
-/// How far cells of a palisade lean from each other, degrees (standard deviation).
+/// Standard deviation of the direction of the cells of a palisade, degrees.
 const LEAN_DEG: f64 = 7.0;
 
-/// The least distance to others of a heap, relative to that of neighbours, and how often another place is tried.
+/// Minimum distance of the cells of an aggregate, relative to that of neighbours, and the number of tries to get it.
 const APART: f64 = 0.8;
 const TRIES: usize = 12;
 
-/// Where a cell lies.
+/// The place of a cell.
 pub(super) struct Place {
     pub(super) centre_um: [f64; 2],
-    /// Direction its long axis is turned to, degrees.
+    /// Direction of the long axis, degrees.
     pub(super) rotation_deg: f64,
-    /// The group it lies in, from 1; 0 if it lies alone.
+    /// Group, from 1; 0 for single cells.
     pub(super) group: u32,
 }
 
 /// Places the cells of one class, group by group.
 pub(super) struct Groups<'a> {
     group: &'a Group,
-    /// Groups begun in this field so far, of all classes.
+    /// Number of groups begun in this field, of all classes.
     begun: u32,
     now: Option<Started>,
 }
 
 /// The group that is being filled.
 struct Started {
-    /// Its first cell.
+    /// The place of its first cell, µm.
     origin_um: [f64; 2],
     /// Direction of its rows, radians.
     direction: f64,
-    /// How much its row bends from cell to cell, radians.
+    /// Bend of the row from cell to cell, radians.
     bend: f64,
-    /// Distance between the middles of neighbours, µm.
+    /// Distance between the centres of neighbours, µm.
     distance_um: f64,
     size: usize,
     cells: Vec<[f64; 2]>,
 }
 
 impl<'a> Groups<'a> {
-    /// For a class, after so many groups of others.
+    /// Starts the groups of a class, after so many groups of other classes.
     pub(super) fn new(group: &'a Group, begun: u32) -> Self {
         Self { group, begun, now: None }
     }
 
-    /// Groups begun in this field so far.
+    /// Returns the number of groups begun in this field.
     pub(super) fn begun(&self) -> u32 {
         self.begun
     }
 
-    /// Whether the next cell begins a group of its own.
+    /// Returns whether the next cell begins a group.
     pub(super) fn is_full(&self) -> bool {
         self.now.as_ref().is_none_or(|group| group.cells.len() >= group.size)
     }
 
-    /// The place of the next cell; `free` gives that of one which begins a group. What a group does is drawn from the stream of its first cell.
+    /// Returns the place of the next cell. `free` returns the place of a cell that begins a group; a group is drawn from the stream of
+    /// its first cell.
     pub(super) fn next<E>(
         &mut self,
         radius_um: f64,
@@ -96,7 +97,7 @@ impl<'a> Groups<'a> {
         let (centre_um, rotation_deg) = match self.group.form {
             GroupForm::Palisade => group.in_a_row(rng),
             GroupForm::Honeycomb => (group.in_a_layer(rng), random::between(0.0, 360.0, rng)),
-            GroupForm::Aggregate | GroupForm::Single => (group.on_a_heap(rng), random::between(0.0, 360.0, rng)),
+            GroupForm::Aggregate | GroupForm::Single => (group.in_an_aggregate(rng), random::between(0.0, 360.0, rng)),
         };
         group.cells.push(centre_um);
         Ok(Place { centre_um, rotation_deg, group: self.begun })
@@ -104,7 +105,7 @@ impl<'a> Groups<'a> {
 }
 
 impl Started {
-    /// Beside the last one, the row bending slowly; cells stand upright on it.
+    /// Returns a place next to the last cell, on a row that bends; cells are perpendicular to it.
     fn in_a_row<R: Rng + ?Sized>(&self, rng: &mut R) -> ([f64; 2], f64) {
         let number = self.cells.len() as f64;
         let heading = self.direction + self.bend * number;
@@ -118,7 +119,7 @@ impl Started {
         (place, heading.to_degrees() + 90.0 + LEAN_DEG * random::normal(rng))
     }
 
-    /// On a hexagonal lattice, in rings round the first.
+    /// Returns a place on a hexagonal lattice, in rings around the first cell.
     fn in_a_layer<R: Rng + ?Sized>(&self, rng: &mut R) -> [f64; 2] {
         let [u, v] = hexagon(self.cells.len());
         let (x, y) = (u + 0.5 * v, v * 0.75_f64.sqrt());
@@ -130,8 +131,8 @@ impl Started {
         ]
     }
 
-    /// Beside any cell that lies there already, where there is most room.
-    fn on_a_heap<R: Rng + ?Sized>(&self, rng: &mut R) -> [f64; 2] {
+    /// Returns a place next to a random cell of the aggregate, as far as possible from the others.
+    fn in_an_aggregate<R: Rng + ?Sized>(&self, rng: &mut R) -> [f64; 2] {
         let mut best = (0.0, self.origin_um);
         for _ in 0..TRIES {
             let Some(beside) = self.cells.get(random::below(self.cells.len(), rng)) else { break };
@@ -154,7 +155,7 @@ impl Started {
     }
 }
 
-/// Axial coordinates of the n-th place of a hexagonal lattice, ring by ring.
+/// Returns the axial coordinates of the n-th place of a hexagonal lattice, ring by ring.
 fn hexagon(number: usize) -> [f64; 2] {
     const STEPS: [[f64; 2]; 6] = [[-1.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [1.0, -1.0], [1.0, 0.0], [0.0, 1.0]];
     let mut ring = 0;
@@ -185,7 +186,7 @@ mod tests {
         for (i, a) in places.iter().enumerate() {
             let nearest = places.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, b)| distance(a, b));
             assert!((nearest.fold(f64::INFINITY, f64::min) - 1.0).abs() < 1e-12, "{i}: {a:?}");
-            // 37 places are the middle and three rings.
+            // 37 places are the centre and three rings.
             assert!(distance(a, &[0.0, 0.0]) <= 3.0 + 1e-12, "{i}: {a:?}");
         }
     }

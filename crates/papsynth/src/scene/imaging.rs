@@ -1,4 +1,4 @@
-//! How a scene is imaged: background, light, optics, camera, their numbers drawn.
+//! The imaging of a scene: background, light, optics and camera, with drawn numbers.
 
 use dye_spectra::Amounts;
 use serde::{Deserialize, Serialize};
@@ -6,24 +6,24 @@ use serde::{Deserialize, Serialize};
 use crate::recipe::imaging::{Mixing, Rendition, SceneMicroscope};
 use crate::recipe::specimen::Restore;
 
-/// Planes that are fused to one picture of extended focus.
+/// Planes that are fused to an EDF image.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fusion {
-    /// Travel of the stage to the first plane, µm.
+    /// Position of the stage at the first plane, µm.
     pub first_um: f64,
-    /// Travel between planes, µm.
+    /// Distance between planes, µm.
     pub step_um: f64,
     /// Number of planes.
     pub planes: usize,
-    /// Correlation of the noise of a pixel with that of the next in its row and in its column.
+    /// Correlation of the noise of neighbouring pixels of a row, and of a column.
     pub noise_correlation: [f64; 2],
-    /// How much more it correlates with that of the next pixel down to the right than of that down to the left, halved.
+    /// Half the difference of the correlations of the noise along the diagonals: down right minus down left.
     pub noise_skew: f64,
 }
 
 impl Fusion {
-    /// The plane nearest to a travel of the stage.
+    /// Returns the position of the plane nearest to a position of the stage, µm.
     #[must_use]
     pub fn nearest_um(&self, stage_um: f64) -> f64 {
         let last = self.planes.saturating_sub(1) as f64;
@@ -32,42 +32,42 @@ impl Fusion {
     }
 }
 
-/// The empty slide, its numbers drawn.
+/// The light of the empty slide, with drawn numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneBackground {
     /// Light as a fraction of full scale.
     pub level: f64,
-    /// How evenly the lamp lights the field.
+    /// Illumination of the field.
     pub illumination: SceneIllumination,
-    /// Strength of the Perlin noise, fraction of full scale.
+    /// Amplitude of the Perlin noise, as a fraction of full scale.
     pub texture: f64,
-    /// Size of its cells, µm.
+    /// Cell size of the Perlin noise, µm.
     pub texture_um: f64,
 }
 
-/// How evenly the lamp lights the field, its numbers drawn.
+/// Illumination of the field, with drawn numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum SceneIllumination {
-    /// Distance to the image's border to the power of an exponent (Eq. 8).
+    /// A power of the distance to the image border (Eq. 8).
     Border {
         /// The exponent.
         exponent: f64,
     },
-    /// A smooth bowl.
+    /// A quadratic falloff.
     Quadratic {
-        /// Fall towards the left and right border.
+        /// Falloff at the left and right border.
         falloff_x: f64,
-        /// Fall towards the upper and lower border.
+        /// Falloff at the upper and lower border.
         falloff_y: f64,
-        /// Where its top lies, as a fraction of half the field.
+        /// Place of the maximum, as a fraction of half the field.
         centre: [f64; 2],
     },
 }
 
 impl SceneIllumination {
-    /// The same with so much of its unevenness.
+    /// Returns the illumination with a fraction of its falloff.
     pub(crate) fn weakened(self, share: f64) -> Self {
         match self {
             Self::Border { exponent } => Self::Border { exponent: share * exponent },
@@ -78,7 +78,7 @@ impl SceneIllumination {
     }
 }
 
-/// The light, its numbers drawn.
+/// The light, with drawn numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum SceneLight {
@@ -86,55 +86,55 @@ pub enum SceneLight {
     Monochrome {
         /// Wavelength, µm.
         wavelength_um: f64,
-        /// Width of the band, µm.
+        /// Bandwidth, µm.
         bandwidth_um: f64,
     },
-    /// Three colours.
+    /// Colour.
     Colour {
-        /// Temperature of the lamp, K.
+        /// Colour temperature of the lamp, K.
         lamp_k: f64,
-        /// How dyes make colours.
+        /// Colour model of the dyes.
         mixing: Mixing,
-        /// How much farther from the objective red light comes to focus than green, µm of stage travel.
+        /// Distance of the focus of red light beyond that of green light, µm of stage travel.
         chromatic_um: f64,
-        /// How colours are written.
+        /// Colour rendition.
         rendition: Rendition,
     },
 }
 
-/// How light spreads, its numbers drawn.
+/// The optics, with drawn numbers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum SceneOptics {
     /// Partially coherent bright field.
     BrightField(SceneMicroscope),
-    /// The paper's Gaussians.
+    /// The paper's Gaussian blur.
     Gaussian {
-        /// Standard deviation in the image plane, µm.
+        /// Standard deviation in focus, µm.
         sigma_xy_um: f64,
-        /// Growth with distance from focus, µm per µm.
+        /// Increase with distance from focus, µm per µm.
         sigma_z_um_per_um: f64,
     },
 }
 
-/// What happens to nuclei whose donors were images already.
+/// Restoration of nuclei whose donors are images.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Restoration {
-    /// What happens.
+    /// Method.
     pub restore: Restore,
-    /// Spread of their feathered mask, µm.
+    /// Standard deviation of the feathered mask, µm.
     pub feather_um: f64,
 }
 
-/// Dyes of everything that is no epithelial cell, in what is stained with strength 1.
+/// Dyes of debris at staining strength 1.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneDyes {
-    /// Of leukocytes, and of objects out of focus.
+    /// Dyes of leukocytes, and of objects out of focus.
     pub nucleus: Amounts,
-    /// Of bacteria.
+    /// Dyes of bacteria.
     pub bacillus: Amounts,
-    /// Of specks.
+    /// Dyes of specks.
     pub speckle: Amounts,
 }

@@ -1,4 +1,4 @@
-//! From a layout to a weight map, and from that to places that keep their distance.
+//! Draws the weight map of a layout, and places cells with a minimum distance.
 
 use rand_core::Rng;
 
@@ -10,25 +10,25 @@ use crate::recipe::{Clusters, Labels, Layout};
 use super::view::{FieldNumbers, Region, View};
 use super::weight::{Sampler, WeightMap};
 
-/// Size of a pixel of a weight map, µm: far below the size of a cell.
+/// Pixel size of a weight map, µm: far below the size of a cell.
 const PITCH_UM: f64 = 4.0;
 
-/// Largest number of pixels along a side of a weight map, for huge fields.
+/// Largest number of pixels along a side of a weight map.
 const MOST_PIXELS: usize = 2048;
 
-/// Width of the margin of a field, µm: about the radius of the largest cells.
+/// Width of the margin of a field, µm: about the largest radius of most cells.
 pub(crate) const MARGIN_UM: f64 = 60.0;
 
-/// Most tries that a whole field may be expected to take.
+/// Largest accepted number of expected tries for a field.
 const MOST_TRIES: f64 = 1e9;
 
-/// Share of a plane that discs cover when no further one fits, if each was placed at random:
+/// Fraction of a plane that randomly placed discs cover when no further disc fits:
 /// random sequential adsorption jams at 0.547 (Feder 1980, doi:10.1016/0022-5193(80)90358-6).
 const JAMMED: f64 = 0.547;
 
-/// Weights of the places of a field, and of a margin round it.
+/// Weights of the places of a field, and of a margin around it.
 ///
-/// Objects of a density also lie in the margin, so that as many reach into the image at its border as anywhere else.
+/// Objects of a density also have centres in the margin, so that the coverage at the border of the image is that of its centre.
 pub(super) struct Weights {
     /// The field.
     pub(super) field: Region,
@@ -53,7 +53,7 @@ pub(super) fn weights(
     let margin_px = pitch_um.map(|pitch| random::count((MARGIN_UM / pitch).ceil()));
     let region = field.with_margin([0, 1].map(|axis| margin_px[axis] as f64 * pitch_um[axis]));
     let size = [0, 1].map(|axis| pixels[axis] + 2 * margin_px[axis]);
-    // A map of the field itself says nothing about its margin.
+    // A given map has no margin.
     let of_map = |map: WeightMap| {
         let (of_field, of_region, populated_mm2) = (map.clone(), map, field.area_mm2());
         Weights { field, region: field, of_field, of_region, populated_mm2 }
@@ -102,7 +102,7 @@ pub(super) fn weights(
     Ok(Weights { field, region, of_field, of_region, populated_mm2 })
 }
 
-/// The weights of round clusters: of a density of clusters also those whose centres lie beyond the margin.
+/// Draws the weights of round clusters. Clusters of a density also have centres beyond the margin.
 fn cluster_map(
     layout: &Clusters,
     field: Region,
@@ -130,7 +130,7 @@ fn cluster_map(
         .collect();
     let distances = nearest_of(&clusters, [width, height], region.size_um);
     let is_empty = distances.iter().all(|square| square.is_infinite());
-    // Where no cluster reaches, cells lie anywhere.
+    // Without a cluster in reach, all places have the same weight.
     let outside = if is_empty { 1.0 } else { outside };
     let weight = |square: &f64| (outside + (1.0 - outside) * libm::exp(-0.5 * square)) as f32;
     WeightMap { width, weights: distances.iter().map(weight).collect() }
@@ -146,15 +146,15 @@ fn cropped(map: &WeightMap, first: [usize; 2], size: [usize; 2]) -> WeightMap {
     WeightMap { width: size[0], weights }
 }
 
-/// The square of the distance of each pixel's middle to the nearest of some clusters, in radii of the cluster; infinite far from all.
+/// Returns the squared distance of the centre of each pixel to the nearest cluster, in radii of the cluster; infinite far from all.
 ///
-/// Each cluster is looked at only round itself, so that the time grows with the field and not with its square.
+/// Each cluster changes only the pixels around it, so that the time is proportional to the area.
 fn nearest_of(clusters: &[[f64; 3]], [width, height]: [usize; 2], size_um: [f64; 2]) -> Vec<f64> {
-    /// How many radii from its middle a cluster ends: with 10⁻⁸ of its weight.
+    /// Radius of influence of a cluster, in its radii: its weight is 10⁻⁸ there.
     const REACH: f64 = 6.0;
     let mut nearest = vec![f64::INFINITY; width * height];
     for [x, y, radius] in clusters {
-        // From a pixel to a distance from the cluster, and to pixels within reach.
+        // The pixels in reach, and the distance of a pixel from the cluster.
         let along = |middle: f64, pixels: usize, length: f64| {
             let pitch = length / pixels as f64;
             let pixel = |at: f64| random::count((at / pitch).clamp(0.0, pixels as f64));
@@ -174,7 +174,7 @@ fn nearest_of(clusters: &[[f64; 3]], [width, height]: [usize; 2], size_um: [f64;
     nearest
 }
 
-/// What is wrong with what a layout names, before anything is drawn.
+/// Checks the file of a layout.
 pub(crate) fn check_layout(layout: &Layout, given: Option<&WeightMap>) -> Result<(), Cause> {
     let (Layout::DensityMap { path } | Layout::Labels(Labels { path, .. })) = layout else { return Ok(()) };
     let map = given.ok_or_else(|| not_given(path, "an image"))?;
@@ -185,7 +185,7 @@ fn not_given(path: &str, what: &'static str) -> Cause {
     Cause::NotGiven { path: path.to_owned(), what }
 }
 
-/// A map blurred by a Gaussian, since a cell's middle may lie beside a given label.
+/// Returns a map blurred by a Gaussian, because the centre of a cell may be next to a given label.
 fn smoothed(map: &WeightMap, sigma_px: f64) -> Result<WeightMap, Cause> {
     map.sampler()?;
     let kernel = optics_psf::Gaussian::new(sigma_px).map_err(Cause::Smoothing)?;
@@ -209,7 +209,7 @@ impl Places {
     }
 
     /// Returns about how many cells fit into the field, or into the field and its margin.
-    pub(super) fn room(&self, in_margin: bool) -> f64 {
+    fn room(&self, in_margin: bool) -> f64 {
         let disc = core::f64::consts::FRAC_PI_4 * self.spacing_um * self.spacing_um;
         let area = self.area_um2(in_margin);
         // A cell at the edge of the possible places takes only part of its disc from them.
@@ -223,17 +223,32 @@ impl Places {
         region.size_um[0] * region.size_um[1] * sampler.possible_share()
     }
 
-    /// Checks whether `count` cells fit, before the search starts.
-    pub(super) fn check(&self, count: usize, in_margin: bool) -> Result<(), Cause> {
-        let room = self.room(in_margin);
-        if count as f64 > room {
-            let (spacing_um, area_um2) = (self.spacing_um, self.area_um2(in_margin));
-            return Err(Cause::NoRoom { count, spacing_um, area_um2, room });
-        }
-        Ok(())
+    /// Returns the number of cells in the field, of those in the field and of those in the field and its margin.
+    fn count_in_field(&self, in_field: usize, in_both: usize) -> f64 {
+        in_field as f64 + in_both as f64 * (self.area_um2(false) / self.area_um2(true)).min(1.0)
     }
 
-    /// Checks whether the search takes a bearable number of tries.
+    /// Checks whether so many cells fit into the field, and into the field and its margin, before the search starts.
+    ///
+    /// # Errors
+    /// If they do not: the fraction of them that fits.
+    pub(super) fn check(&self, in_field: usize, in_both: usize) -> Result<(), f64> {
+        let fraction = (self.room(false) / self.count_in_field(in_field, in_both))
+            .min(self.room(true) / (in_field + in_both) as f64);
+        if fraction < 1.0 { Err(fraction) } else { Ok(()) }
+    }
+
+    /// Returns the error about cells that do not fit.
+    pub(super) fn no_room(&self, in_field: usize, in_both: usize) -> Cause {
+        Cause::NoRoom {
+            count: random::count(self.count_in_field(in_field, in_both)),
+            spacing_um: self.spacing_um,
+            area_um2: self.area_um2(false),
+            room: self.room(false),
+        }
+    }
+
+    /// Checks the expected number of tries.
     pub(super) fn check_tries(&self, count: usize, in_margin: bool) -> Result<(), Cause> {
         let tries = self.areas[usize::from(in_margin)].0.expected_tries() * count as f64;
         if tries > MOST_TRIES {
@@ -242,9 +257,9 @@ impl Places {
         Ok(())
     }
 
-    /// The next place, µm: in the field, or in the field and its margin.
+    /// Returns the next place, µm: in the field, or in the field and its margin.
     pub(super) fn next<R: Rng + ?Sized>(&mut self, in_margin: bool, rng: &mut R) -> Result<[f64; 2], Cause> {
-        /// Accepted candidates that may turn out too near to others before the search is given up.
+        /// Largest number of accepted candidates that are too near to others.
         const CROWDED: usize = 20_000;
         let mut crowded = 0;
         let (sampler, region) = &self.areas[usize::from(in_margin)];
@@ -289,7 +304,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn clusters_weigh_what_the_nearest_does() {
+    fn the_weight_is_that_of_the_nearest_cluster() {
         let clusters = [[100.0, 40.0, 30.0], [300.0, 200.0, 12.0], [-20.0, 260.0, 25.0], [390.0, 90.0, 60.0]];
         let (size, size_um) = ([101, 77], [404.0, 308.0]);
         let found = nearest_of(&clusters, size, size_um);

@@ -1,7 +1,7 @@
-//! The scene: a plain list of everything on a slide, drawn before any pixel is touched.
+//! The scene: a list of all objects of a field, drawn before any image is computed.
 //!
-//! The scene is the hinge between recipe and picture: nothing after it decides what exists. It is written as JSON
-//! ([`Scene::to_json`]) and read back ([`Scene::from_json`]), so that it can be edited, or made by another program.
+//! A scene is drawn from a recipe, and an image is computed from a scene. Scenes are written as JSON ([`Scene::to_json`]) and
+//! read back ([`Scene::from_json`]), so that they can be edited or made by another program.
 
 pub(crate) mod cell;
 mod cells;

@@ -1,8 +1,8 @@
-//! What lies on a whole slide, square by square.
+//! The objects of a whole slide, square by square.
 //!
-//! A slide is divided into plots. What a plot holds follows from the slide's key and the plot's number alone: how many objects are
-//! tried, where each lies, and whether it stays there, by the density at its place, which is a function of the place.
-//! So any part of a slide can be drawn alone, and a slide is part of every larger one.
+//! A slide is divided into plots. The objects of a plot depend only on the key of the slide and the number of the plot: the number
+//! of tries, the place of each try, and whether it is accepted, by the density at its place, which is a function of the place.
+//! Any part of a slide can be drawn alone, and a slide is a part of each larger slide.
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
@@ -26,52 +26,52 @@ use crate::recipe::scan::SceneDeposit;
 use crate::recipe::section::named;
 use crate::recipe::{Clusters as ClusterLayout, Deposit as DepositSection, GroupForm, Layout, Number, Recipe};
 
-/// Side of a plot in pixels.
+/// Size of a plot, pixels.
 pub(crate) const PLOT_PX: i64 = 1024;
 
-/// Plots beyond the upper and left border of a slide, whose objects may reach into it.
+/// Number of plots beyond the upper and left border of a slide whose objects may reach into the slide.
 pub(crate) const BEYOND: i64 = 8;
 
-/// Bits of a plot's column and row in its number, and of an object in its id.
+/// Bits of the column and the row of a plot in its number, and of an object in its id.
 const SIDE_BITS: u32 = 10;
 const OBJECT_BITS: u32 = 12;
 
-/// Plots whose objects are remembered.
-const REMEMBERED: usize = 192;
+/// Number of plots whose objects are cached.
+const CACHED_PLOTS: usize = 192;
 
-/// What lies on one slide.
+/// The objects of a slide.
 #[derive(Debug)]
 pub(crate) struct Population {
     recipe: Recipe,
     model: Model,
     key: Key,
     pixel_um: f64,
-    /// Plots that are as large as a field.
+    /// Area of a plot relative to that of a field.
     share: f64,
     spacing_um: f64,
     deposit: Deposit,
     places: Places,
     relief: Relief,
-    sown: Memory,
-    plots: Memory,
+    sown: PlotCache,
+    plots: PlotCache,
 }
 
-/// Where the layout lets cells lie: anywhere, or in clusters.
+/// The layout of the cells of a slide: uniform, or in clusters.
 #[derive(Debug)]
 struct Places {
     clusters: Option<ClusterLayout>,
-    /// Weight of the places outside all clusters.
+    /// Weight outside the clusters.
     outside: f64,
-    /// Plots that a cluster reaches beyond its own.
+    /// Number of plots that a cluster reaches beyond its own.
     reach: i64,
     /// Mean weight.
     mean: f64,
 }
 
-/// A cluster's middle and radius, µm.
+/// Centre and radius of a cluster, µm.
 type Cluster = [f64; 3];
 
-/// How deep a slide's cells lie: the noise of a field's relief, as a function of the place.
+/// Depth of the cells of a slide: the noise of the relief of a field, as a function of the place.
 #[derive(Debug)]
 struct Relief {
     noise: Fractal,
@@ -79,14 +79,14 @@ struct Relief {
     scale_um: f64,
 }
 
-/// Objects of the plots that were worked out last, by row and column.
+/// Cached objects of plots, by row and column.
 #[derive(Debug, Default)]
-struct Memory {
+struct PlotCache {
     known: Mutex<BTreeMap<[i64; 2], Arc<Vec<Object>>>>,
 }
 
-impl Memory {
-    /// What was made of a plot, or is made now: the same, however often.
+impl PlotCache {
+    /// Returns the cached objects of a plot, or the result of `make`.
     fn get<E>(&self, at: [i64; 2], make: impl FnOnce() -> Result<Vec<Object>, E>) -> Result<Arc<Vec<Object>>, E> {
         let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(found) = known().get(&[at[1], at[0]]) {
@@ -95,8 +95,8 @@ impl Memory {
         let made = Arc::new(make()?);
         let mut known = known();
         known.insert([at[1], at[0]], Arc::clone(&made));
-        if known.len() > REMEMBERED {
-            // Slides are worked through from the top: the first row is farthest behind.
+        if known.len() > CACHED_PLOTS {
+            // Slides are generated from the top: the first row is needed least.
             known.pop_first();
         }
         Ok(made)
@@ -104,7 +104,7 @@ impl Memory {
 }
 
 impl Population {
-    /// The population of a slide whose own key is given, and the slide without anything on it.
+    /// Returns the population of the slide with this key, and the scene of the empty slide.
     pub(crate) fn new(recipe: &Recipe, model: &Model, key: Key) -> Result<(Self, Scene), Cause> {
         let slide = FieldNumbers { key };
         let stain = FieldStain::of_slide(&recipe.stain, &slide);
@@ -128,14 +128,14 @@ impl Population {
                 slide.draw(named!(recipe.slide.depth_scale_um)),
                 relief_key,
             ),
-            sown: Memory::default(),
-            plots: Memory::default(),
+            sown: PlotCache::default(),
+            plots: PlotCache::default(),
         };
         population.place_clusters(&slide)?;
         Ok((population, scene))
     }
 
-    /// Middle of the deposit, µm.
+    /// Returns the centre of the deposit, µm.
     pub(crate) fn middle_um(&self) -> [f64; 2] {
         self.deposit.centre_um()
     }
@@ -148,11 +148,11 @@ impl Population {
         self.side_um() * self.side_um() * 1e-6
     }
 
-    /// How the layout lets cells lie on a slide.
+    /// Prepares the layout.
     fn place_clusters(&mut self, slide: &FieldNumbers) -> Result<(), Cause> {
-        /// Most plots that a cluster may reach beyond its own.
+        /// Largest number of plots that a cluster may reach beyond its own.
         const FARTHEST: i64 = 4;
-        /// Places, along a side, at which the mean weight is taken, and plots that they lie in.
+        /// Number of places along a side for the mean weight, and of plots that contain them.
         const PLACES: i64 = 96;
         const ACROSS: i64 = 12;
         let layout = match &self.recipe.layout {
@@ -167,7 +167,7 @@ impl Population {
         }
         let outside = slide.draw(named!("layout", layout.outside));
         self.places = Places { clusters: Some(layout.clone()), outside, reach, mean: 1.0 };
-        // The mean over a part of the slide that does not depend on the slide's size.
+        // The mean over an area that does not depend on the size of the slide.
         let mut sum = 0.0;
         for row in 0..ACROSS {
             for column in 0..ACROSS {
@@ -185,7 +185,7 @@ impl Population {
         Ok(())
     }
 
-    /// The clusters that reach into a plot.
+    /// Returns the clusters that reach into a plot.
     fn clusters(&self, at: [i64; 2]) -> Vec<Cluster> {
         let Places { clusters: Some(layout), reach, .. } = &self.places else { return Vec::new() };
         let mut clusters = Vec::new();
@@ -204,7 +204,7 @@ impl Population {
         clusters
     }
 
-    /// The cells of a plot, but for those that lie too near to one of another plot.
+    /// Draws the cells of a plot, including those too near to cells of other plots.
     fn sow(&self, at: [i64; 2]) -> Vec<Object> {
         let field = FieldNumbers { key: self.key.plot(number(at)) };
         let slide = FieldNumbers { key: self.key };
@@ -218,7 +218,7 @@ impl Population {
         let mut first: Vec<[f64; 2]> = Vec::new();
         let (mut tried, mut begun) = (0_u64, 0);
         for (name, mix) in &self.recipe.cells {
-            // The engine was made with this model and recipe.
+            // The engine has checked that the model has the class.
             let kind = Class { name, mix, class: &self.model.classes[name] };
             let path = format!("cells.{name}.count");
             let alone = mix.group.form == GroupForm::Single;
@@ -236,7 +236,7 @@ impl Population {
                 }
                 first.push(origin);
                 let mut groups = Groups::new(&mix.group, begun);
-                // Members of a group are numbered beyond all that are tried.
+                // The numbers of members of a group are above those of all tries.
                 let mut member = 0;
                 loop {
                     let number = if member == 0 { number } else { number << 16 | 1 << 56 | member };
@@ -261,7 +261,7 @@ impl Population {
         sown
     }
 
-    /// Everything whose middle was drawn in a plot, in the order of its ids; places are counted from the plot's corner.
+    /// Returns the objects of a plot, by id. Places are relative to the corner of the plot.
     pub(crate) fn plot(&self, at: [i64; 2]) -> Result<Arc<Vec<Object>>, Cause> {
         self.plots.get(at, || self.draw(at))
     }
@@ -273,7 +273,7 @@ impl Population {
         let stain = FieldStain::of_slide(&self.recipe.stain, &slide);
         let side_um = self.side_um();
         let mut objects = self.sown(at).as_ref().clone();
-        // Of two cells of neighbouring plots that lie too near to each other, that of the plot with the larger number goes.
+        // Of two cells of neighbouring plots that are too near to each other, that of the plot with the larger number is removed.
         let mut taken = Vec::new();
         for [x, y] in [[-1, -1], [0, -1], [1, -1], [-1, 0]] {
             let corner = [x, y].map(|step: i64| step as f64 * side_um);
@@ -289,7 +289,7 @@ impl Population {
             let place = [0, 1].map(|axis| place[axis] + at[axis] as f64 * side_um);
             self.deposit.density(place) / DENSEST
         };
-        // Those that stay anywhere are tried as often as there are some, the others more often.
+        // Objects on the glass are not rejected, so that they need no additional tries.
         let plot_density = PlotDensity { area_in_fields: self.share, max_density: DENSEST, keep_probability: &stays };
         strew(&self.recipe.debris, [region; 2], &field, &stain, Some(plot_density), &mut objects);
         let most = (1 << OBJECT_BITS) - 2;
@@ -307,10 +307,10 @@ impl Population {
     }
 }
 
-/// How many radii from its middle a cluster ends.
+/// Radius of influence of a cluster, in its radii.
 const CLUSTER_REACH: f64 = 4.3;
 
-/// The weight of a place, from `outside` to 1.
+/// Returns the weight of a place, from `outside` to 1.
 fn weight(clusters: &[Cluster], outside: f64, [x, y]: [f64; 2]) -> f64 {
     let square = |[cx, cy, radius]: &Cluster| ((x - cx) * (x - cx) + (y - cy) * (y - cy)) / (radius * radius);
     let nearest = clusters.iter().map(square).fold(f64::INFINITY, f64::min);
@@ -318,13 +318,13 @@ fn weight(clusters: &[Cluster], outside: f64, [x, y]: [f64; 2]) -> f64 {
     outside + (1.0 - outside) * share
 }
 
-/// The number of a plot on its slide.
+/// Returns the number of a plot on its slide.
 fn number([column, row]: [i64; 2]) -> u32 {
     let side = |at: i64| (at + BEYOND).clamp(0, (1 << SIDE_BITS) - 1) as u32;
     side(row) << SIDE_BITS | side(column)
 }
 
-/// The mean of a number as it is drawn.
+/// Returns the mean of a drawn count of at least 1.
 fn mean_of(number: &Number) -> f64 {
     const DRAWS: u64 = 256;
     let mut rng = Key { seed: 0, index: 0 }.stream("slide", 0, "mean");
@@ -333,23 +333,23 @@ fn mean_of(number: &Number) -> f64 {
 
 impl Relief {
     fn new(depth_um: f64, cell_um: f64, key: u64) -> Self {
-        /// How far the noise of a field reaches from its lowest to its highest place, in the mean.
+        /// Mean range of the noise over a field.
         const RANGE: f64 = 1.1;
         let params = FractalParams { octaves: 2, ..FractalParams::default() };
         let noise = Fractal::new(&params, key).expect("two octaves of noise are valid");
         Self { noise, cell_um, scale_um: depth_um / RANGE }
     }
 
-    /// Depth at a place of the slide, µm.
+    /// Returns the depth at a place of the slide, µm.
     fn at(&self, [x, y]: [f64; 2]) -> f64 {
         self.scale_um * f64::from(self.noise.at(x / self.cell_um, y / self.cell_um))
     }
 }
 
-/// Densest patch, relative to the mean.
+/// Largest density, relative to the mean.
 const DENSEST: f64 = 2.5;
 
-/// The round deposit of a slide, its numbers drawn.
+/// The round deposit of a slide, with drawn numbers.
 #[derive(Debug)]
 struct Deposit {
     drawn: SceneDeposit,
@@ -366,12 +366,12 @@ impl Deposit {
         }
     }
 
-    /// Its middle, µm.
+    /// Returns its centre, µm.
     fn centre_um(&self) -> [f64; 2] {
         [self.drawn.x_um, self.drawn.y_um]
     }
 
-    /// Density at a place of the slide, µm, relative to the mean within the deposit; at most [`DENSEST`].
+    /// Returns the density at a place of the slide, relative to the mean inside the deposit; at most [`DENSEST`].
     fn density(&self, [x, y]: [f64; 2]) -> f64 {
         /// Standard deviation of the noise.
         const SPREAD: f64 = 0.27;

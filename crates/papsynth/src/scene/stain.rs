@@ -1,4 +1,4 @@
-//! How slides, fields and cells took up the stain: its strength, and the balance of its dyes.
+//! The stain of slides, fields and cells: its strength, and the balance of its dyes.
 
 use dye_spectra::{Amounts, DYES};
 use rand_core::Rng;
@@ -32,7 +32,7 @@ impl<'a> FieldStain<'a> {
         Self::of(stain, field, &FieldNumbers { key: Key { index: slide, ..field.key } })
     }
 
-    /// The stain of a whole slide, whose key is its own.
+    /// Returns the stain of a whole slide.
     pub(super) fn of_slide(stain: &'a Stain, slide: &FieldNumbers) -> Self {
         Self::of(stain, slide, slide)
     }
@@ -57,23 +57,23 @@ impl<'a> FieldStain<'a> {
         }
     }
 
-    /// The dyes of what is no epithelial cell.
+    /// Returns the dyes of debris.
     pub(super) fn debris(&self) -> SceneDyes {
         let stain = self.stain;
         SceneDyes {
             nucleus: self.balanced(&stain.nucleus),
             bacillus: self.balanced(&stain.bacillus),
-            // What is grey did not come with the stain.
+            // Grey is not part of the stain.
             speckle: stain.speckle.amounts(),
         }
     }
 
-    /// The dyes of pale cytoplasm.
+    /// Returns the dyes of pale cytoplasm.
     pub(crate) fn cyanophilic(&self) -> Amounts {
         self.balanced(&self.stain.cyanophilic)
     }
 
-    /// The tint of a cell, and the dyes of its cytoplasm and its nucleus.
+    /// Returns the tint of a cell, and the dyes of its cytoplasm and its nucleus.
     pub(super) fn cell<R: Rng + ?Sized>(&self, tints: &TintMix, rng: &mut R) -> (Tint, Amounts, Amounts) {
         let stain = self.stain;
         let weights = [&tints.cyanophilic, &tints.eosinophilic, &tints.orangeophilic].map(|weight| weight.draw(rng));
@@ -91,7 +91,7 @@ impl<'a> FieldStain<'a> {
         (tint, shifted(dyes), shifted(&stain.nucleus))
     }
 
-    /// Dyes with this field's balance of them.
+    /// Returns dyes with the balance of this field.
     pub(crate) fn balanced(&self, dyes: &DyeAmounts) -> Amounts {
         let mut amounts = dyes.amounts();
         for (amount, factor) in amounts.iter_mut().zip(&self.balance) {

@@ -1,4 +1,4 @@
-//! The size of a field, and the numbers that belong to a whole one.
+//! The size of a field, and numbers drawn once a field.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,18 +15,18 @@ pub struct View {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Size of a pixel, µm.
+    /// Pixel size, µm.
     pub pixel_um: f64,
 }
 
 impl View {
-    /// Micrometres to pixels: pixel centres lie at whole numbers, the image's corner at −½.
+    /// Converts micrometres to pixels. Pixel centres have integer coordinates, the corner of the image is at −½.
     #[must_use]
     pub fn to_px(&self, point_um: [f64; 2]) -> [f64; 2] {
         [point_um[0] / self.pixel_um - 0.5, point_um[1] / self.pixel_um - 0.5]
     }
 
-    /// Width and height in micrometres.
+    /// Returns width and height, µm.
     #[must_use]
     pub fn size_um(&self) -> [f64; 2] {
         [self.width as f64 * self.pixel_um, self.height as f64 * self.pixel_um]
@@ -73,8 +73,8 @@ impl Region {
     }
 }
 
-/// Draws numbers that belong to a whole field, each from a stream named after its place in the recipe: giving one of
-/// them a distribution changes none of the others.
+/// Draws the numbers of a field, each from the stream with its path in the recipe: a change of one number does not change the
+/// others.
 pub(crate) struct FieldNumbers {
     pub(crate) key: Key,
 }
@@ -110,7 +110,7 @@ impl FieldNumbers {
         self.whole(path, abundance.draw(area_mm2, fields, &mut self.stream(path)) * factor)
     }
 
-    /// A whole number that is as large as `wanted` in the mean, drawn for what stands at a path.
+    /// Rounds `wanted` up or down at random, so that the mean is `wanted`.
     pub(crate) fn whole(&self, path: &str, wanted: f64) -> u64 {
         let further = random::chance(wanted - wanted.floor(), &mut self.key.stream("field", 1, path));
         wanted as u64 + u64::from(further)

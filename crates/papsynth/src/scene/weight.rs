@@ -5,12 +5,12 @@ use rand_core::Rng;
 use crate::error::Cause;
 use crate::random;
 
-/// How likely each place of a field is, as an image that is stretched over it.
+/// Relative density of cells at each place of a field, as an image stretched over the field.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WeightMap {
     /// Columns.
     pub width: usize,
-    /// Weights of 0 or more, row by row; only their ratios count.
+    /// Weights of at least 0, row by row; only their ratios matter.
     pub weights: Vec<f32>,
 }
 
@@ -21,12 +21,12 @@ pub(crate) struct Sampler {
     height: usize,
     weights: Vec<f32>,
     largest: f32,
-    /// Pixels that can be drawn at all.
+    /// Pixels with a weight above 0.
     possible: Vec<u32>,
 }
 
 impl WeightMap {
-    /// A map of `width` x `height` whose pixels are given by a function of their centre, as fractions of the map.
+    /// Returns a map whose weights are a function of the centres of its pixels, given as fractions of the map.
     pub(crate) fn from_fn(width: usize, height: usize, weight: impl Fn([f64; 2]) -> f64) -> Self {
         let mut weights = Vec::with_capacity(width * height);
         for y in 0..height {
@@ -38,7 +38,7 @@ impl WeightMap {
         Self { width, weights }
     }
 
-    /// Prepares the map, or says why nothing can be drawn from it.
+    /// Prepares the map for sampling, or returns why it is invalid.
     pub(crate) fn sampler(&self) -> Result<Sampler, Cause> {
         if self.width == 0 || self.weights.is_empty() || !self.weights.len().is_multiple_of(self.width) {
             return Err(Cause::MapSize(self.weights.len(), self.width));
@@ -63,20 +63,20 @@ impl WeightMap {
 }
 
 impl Sampler {
-    /// Share of the field where something can be placed at all.
+    /// Returns the fraction of the field with a weight above 0.
     pub(crate) fn possible_share(&self) -> f64 {
         self.possible.len() as f64 / self.weights.len() as f64
     }
 
-    /// Expected number of tries for one accepted place.
+    /// Returns the expected number of tries per accepted place.
     pub(crate) fn expected_tries(&self) -> f64 {
         let sum: f64 = self.weights.iter().map(|w| f64::from(*w)).sum();
         f64::from(self.largest) * self.possible.len() as f64 / sum
     }
 
-    /// One try: a place as fractions of the field, if it was accepted.
+    /// Tries once: returns a place as fractions of the field, if it is accepted.
     ///
-    /// Candidates are uniform over the places that can be drawn at all (Eq. 5) and accepted with probability
+    /// Candidates are uniform over the places with a weight above 0 (Eq. 5) and accepted with probability
     /// W(x, y) / max W.
     pub(crate) fn try_place<R: Rng + ?Sized>(&self, rng: &mut R) -> Option<[f64; 2]> {
         let pixel = *self.possible.get(random::below(self.possible.len(), rng))? as usize;
@@ -125,9 +125,9 @@ mod tests {
     }
 
     #[test]
-    fn a_map_that_yields_nothing_is_an_error_that_says_so() {
+    fn invalid_maps_are_errors() {
         for (width, weights, said) in [
-            (2, vec![0.0; 4], "every weight is zero"),
+            (2, vec![0.0; 4], "all weights are zero"),
             (0, vec![], "0 pixels"),
             (3, vec![1.0; 4], "rows of 3"),
             (2, vec![1.0, f32::NAN], "(1, 0)"),

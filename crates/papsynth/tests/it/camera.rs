@@ -3,7 +3,8 @@
 use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::{
-    Binning, Border, CameraPreset, Colour, Debris, Illumination, Light, Mixing, PhotonNoise, Preset, Recipe, Rendition,
+    Binning, Border, CameraPreset, Colour, Debris, Illumination, LightSection, Mixing, PhotonNoise, Preset, Recipe,
+    Rendition,
 };
 use papsynth::{Engine, Frame, Inputs};
 
@@ -100,7 +101,8 @@ fn jpeg_is_the_last_step() {
         let mut recipe = empty();
         if colour {
             let (mixing, rendition) = (Mixing::Spectral, Rendition::Display);
-            recipe.light = Light::Colour(Colour { lamp_k: 3200.0.into(), mixing, chromatic_um: 0.0.into(), rendition });
+            recipe.light =
+                LightSection::Colour(Colour { lamp_k: 3200.0.into(), mixing, chromatic_um: 0.0.into(), rendition });
         }
         let plain = frame(&recipe, 0);
         recipe.camera.jpeg_quality = 60.0.into();

@@ -5,8 +5,8 @@
 use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::{
-    Border, Colour, Debris, DyeAmounts, Gaussians, Illumination, Imaging, Law, Layout, Light, Microscope, Mixing,
-    Monochrome, Number, Optics, Preset, Recipe,
+    Border, Colour, Debris, Distribution, DyeAmounts, Gaussians, Illumination, Imaging, Layout, LightSection,
+    Microscope, Mixing, Monochrome, Number, Optics, Preset, Recipe,
 };
 use papsynth::recipe::{Rendition, Restore};
 use papsynth::scene::{Body, ObjectKind};
@@ -76,7 +76,7 @@ fn error(a: &[f32], b: &[f32]) -> f64 {
 }
 
 fn colour(recipe: &mut Recipe, mixing: Mixing, rendition: Rendition) {
-    recipe.light = Light::Colour(Colour { lamp_k: 3200.0.into(), mixing, chromatic_um: 0.3.into(), rendition });
+    recipe.light = LightSection::Colour(Colour { lamp_k: 3200.0.into(), mixing, chromatic_um: 0.3.into(), rendition });
 }
 
 #[test]
@@ -247,7 +247,7 @@ fn per_wavelength_colour_is_the_weighted_sum_of_monochrome_images() {
     // One monochrome image for each wavelength node of lamp and sensor.
     let mut recipe = small();
     recipe.debris = empty().debris;
-    recipe.light = Light::Colour(Colour {
+    recipe.light = LightSection::Colour(Colour {
         lamp_k: 3200.0.into(),
         mixing: Mixing::PerWavelength,
         chromatic_um: 0.0.into(),
@@ -258,8 +258,10 @@ fn per_wavelength_colour_is_the_weighted_sum_of_monochrome_images() {
     let mut sums = vec![0.0_f64; colours.len()];
     for node in 0..16 {
         let nodes = sensor.channels().each_ref().map(|channel| channel.nodes[node]);
-        recipe.light =
-            Light::Monochrome(Monochrome { wavelength_um: nodes[0].wavelength_um.into(), bandwidth_um: 0.0.into() });
+        recipe.light = LightSection::Monochrome(Monochrome {
+            wavelength_um: nodes[0].wavelength_um.into(),
+            bandwidth_um: 0.0.into(),
+        });
         let grey = light(&recipe);
         for (pixel, value) in sums.chunks_exact_mut(3).zip(&grey) {
             pixel.iter_mut().zip(&nodes).for_each(|(sum, node)| *sum += node.weight * f64::from(*value));
@@ -327,7 +329,8 @@ fn a_grey_stain_is_the_same_at_every_wavelength() {
     recipe.stain.field_balance = 0.0.into();
     recipe.stain.cell_balance = 0.0.into();
     let mut at = |wavelength_um: f64| {
-        recipe.light = Light::Monochrome(Monochrome { wavelength_um: wavelength_um.into(), bandwidth_um: 0.01.into() });
+        recipe.light =
+            LightSection::Monochrome(Monochrome { wavelength_um: wavelength_um.into(), bandwidth_um: 0.01.into() });
         light(&recipe)
     };
     assert_eq!(at(0.45), at(0.65));
@@ -340,7 +343,8 @@ fn nuclei_stand_out_most_near_the_papers_filter() {
     mix.count = 1.0.into();
     recipe.cells = [("intermediate".to_owned(), mix)].into();
     let mut contrast = |wavelength_um: f64| {
-        recipe.light = Light::Monochrome(Monochrome { wavelength_um: wavelength_um.into(), bandwidth_um: 0.0.into() });
+        recipe.light =
+            LightSection::Monochrome(Monochrome { wavelength_um: wavelength_um.into(), bandwidth_um: 0.0.into() });
         let frame = frame(&recipe, 0);
         let objects = &frame.finished.truth.objects;
         objects.iter().find(|o| o.part == Part::Nucleus).unwrap().detectability[0]
@@ -386,9 +390,9 @@ fn invalid_apertures_are_reported_with_their_field() {
     let text = problems(&|recipe| set(recipe, |optics| *optics.condenser_na = 1.55.into()));
     assert!(text.contains("optics.condenser_na") && text.contains("less than 1.515"), "{text}");
     let text = problems(&|recipe| {
-        recipe.light = Light::Monochrome(Monochrome { wavelength_um: 0.0.into(), bandwidth_um: 0.01.into() });
+        recipe.light = LightSection::Monochrome(Monochrome { wavelength_um: 0.0.into(), bandwidth_um: 0.01.into() });
     });
-    assert!(text.contains("light.wavelength_um: 0 is outside 0.4 to 0.7"), "{text}");
+    assert!(text.contains("light.wavelength_um: 0 is out of range: expected 0.4 to 0.7"), "{text}");
     let text = problems(&|recipe| {
         recipe.optics = Optics::gaussian();
         colour(recipe, Mixing::Spectral, Rendition::Raw);
@@ -421,7 +425,7 @@ fn specks_of_both_forms_have_the_specified_size() {
     let mut recipe = empty();
     recipe.debris.speckles.count = 30.0.into();
     recipe.debris.speckles.dilations =
-        Number::Drawn { law: Law::Choice(vec![2.0]), min: f64::NEG_INFINITY, max: f64::INFINITY };
+        Number::Drawn { distribution: Distribution::Choice(vec![2.0]), min: f64::NEG_INFINITY, max: f64::INFINITY };
     for form in [papsynth::recipe::SpeckForm::Round, papsynth::recipe::SpeckForm::Dilated] {
         recipe.debris.speckles.form = form;
         let frame = frame(&recipe, 0);

@@ -1,7 +1,7 @@
 //! Complete slides: no seams, and no dependence on tiles, frames, order or slide size.
 
 use papsynth::model::Model;
-use papsynth::recipe::{Colour, Illumination, Light, Preset, Quadratic, Recipe};
+use papsynth::recipe::{Colour, Illumination, LightSection, Preset, Quadratic, Recipe};
 use papsynth::slide::SlidePart;
 use papsynth::truth::Part;
 use papsynth::{Engine, Inputs, Threads};
@@ -45,7 +45,7 @@ fn difference(a: &SlidePart, b: &SlidePart) -> f32 {
 #[test]
 fn frames_join_without_a_seam() {
     let mut colour = recipe();
-    colour.light = Light::Colour(Colour {
+    colour.light = LightSection::Colour(Colour {
         lamp_k: 3200.0.into(),
         mixing: papsynth::recipe::Mixing::Spectral,
         chromatic_um: 0.3.into(),
@@ -196,9 +196,7 @@ fn density_matches_fields_inside_the_deposit_and_is_lower_outside() {
     };
     let fields = 24;
     let scenes = (0..fields).map(|index| engine.scene(papsynth::key::Key { seed: 3, index }).unwrap());
-    let cells: usize = scenes
-        .map(|scene| scene.objects.iter().filter(|o| o.body.kind() == papsynth::scene::ObjectKind::Cell).count())
-        .sum();
+    let cells: u64 = scenes.map(|scene| scene.cells.values().map(|count| count.in_field).sum::<u64>()).sum();
     let wanted = cells as f64 / (fields as f64 * 1376.0 * 1038.0);
     let side = 8000;
     let (mut inside, mut beyond) = (0.0, 0.0);

@@ -1,8 +1,8 @@
-//! "Did you mean …?": the nearest of some words.
+//! Suggestions for misspelt words.
 
-/// The candidate that is most likely meant by a misspelt word, if any is near.
+/// Returns the candidate most similar to a misspelt word, if one is similar enough.
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    /// A word is near when at most one in this many of its letters has to change.
+    /// A candidate is similar enough if at most one letter in so many changes.
     const LETTERS_PER_CHANGE: usize = 3;
     let plain = fold(word);
     let reach = (plain.len() / LETTERS_PER_CHANGE).max(1);
@@ -14,14 +14,14 @@ pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .map(|(_, candidate)| candidate)
 }
 
-/// Case and the kind of dash do not count.
+/// Ignores case and the difference between dash and underscore.
 fn fold(word: &str) -> Vec<char> {
-    /// Words longer than any name are cut: their distance to every name is beyond reach anyway.
+    /// Length to which words are cut; all names are shorter.
     const LONGEST: usize = 64;
     word.chars().take(LONGEST).map(|c| if c == '-' { '_' } else { c.to_ascii_lowercase() }).collect()
 }
 
-/// Changes, insertions, deletions and swaps of neighbours that turn one word into the other (optimal string alignment).
+/// Returns the number of changes, insertions, deletions and swaps of neighbours between two words (optimal string alignment).
 fn distance(a: &[char], b: &[char]) -> usize {
     let mut before: Vec<usize> = Vec::new();
     let mut last: Vec<usize> = (0..=b.len()).collect();
@@ -57,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn only_near_words_are_offered() {
+    fn only_similar_words_are_suggested() {
         let keys = ["width_px", "height_px", "pixel_um"];
         assert_eq!(nearest("widht_px", keys), Some("width_px"));
         assert_eq!(nearest("Width-px", keys), Some("width_px"));

@@ -1,4 +1,4 @@
-//! What a recipe may hold, looked up in its JSON schema: the keys of a section, the words of a field, its meaning.
+//! Lookups in the JSON schema of recipes: the keys of a section, the words and the documentation of a field.
 
 use serde_json::{Map, Value};
 
@@ -14,7 +14,7 @@ pub struct Schema {
 #[derive(Clone, Copy)]
 pub struct Section<'s> {
     root: &'s Value,
-    /// As it stands where the part is named, with the meaning it has there.
+    /// The schema at the reference to the part, with the documentation there.
     named: &'s Value,
 }
 
@@ -25,25 +25,25 @@ impl Default for Schema {
 }
 
 impl Schema {
-    /// That of this version.
+    /// Returns the schema of this version.
     #[must_use]
     pub fn new() -> Self {
         Self { root: Recipe::schema() }
     }
 
-    /// The whole recipe.
+    /// Returns the schema of the complete recipe.
     pub fn root(&self) -> Section<'_> {
         Section { root: &self.root, named: &self.root }
     }
 
-    /// The part that a dotted path leads to.
+    /// Returns the part at a path.
     pub fn at(&self, path: &[String]) -> Option<Section<'_>> {
         path.iter().try_fold(self.root(), |section, name| section.field(name, None))
     }
 
-    /// The sections that know a key of this name, as dotted paths.
+    /// Returns the dotted paths of the sections that have a key of this name.
     pub fn homes_of(&self, key: &str) -> Vec<String> {
-        /// Sections lie three deep: `debris.bacilli.clusters`.
+        /// Largest depth of sections: `debris.bacilli.clusters` has 3.
         const DEEPEST: usize = 4;
         let mut found = Vec::new();
         let mut open = vec![(Vec::new(), self.root())];
@@ -64,13 +64,13 @@ impl Schema {
 }
 
 impl<'s> Section<'s> {
-    /// The schema behind a reference.
+    /// Returns the referenced schema.
     fn schema(self) -> &'s Value {
         let pointer = self.named.get("$ref").and_then(Value::as_str).map(|r| r.trim_start_matches('#'));
         pointer.and_then(|p| self.root.pointer(p)).unwrap_or(self.named)
     }
 
-    /// The schema itself and, where it has them, its alternatives.
+    /// Returns the schema and its alternatives.
     fn alternatives(self) -> impl Iterator<Item = Self> {
         let schema = self.schema();
         let of = move |name: &str| schema.get(name).and_then(Value::as_array).into_iter().flatten();
@@ -82,19 +82,19 @@ impl<'s> Section<'s> {
         self.named.get("properties").and_then(Value::as_object)
     }
 
-    /// Whether it is one of the alternatives that a table's `kind` leaves.
+    /// Returns whether the alternative agrees with the `kind` of a table.
     fn agrees(self, kind: Option<&str>) -> bool {
         let own = self.named.pointer("/properties/kind/const").and_then(Value::as_str);
         kind.is_none() || own.is_none() || own == kind
     }
 
-    /// Every key it knows, of all its alternatives.
+    /// Returns the keys of all alternatives.
     fn fields(self) -> impl Iterator<Item = (&'s str, Self)> {
         let properties = self.alternatives().filter_map(Self::properties).flatten();
         properties.map(move |(name, named)| (name.as_str(), Self { root: self.root, named }))
     }
 
-    /// The keys it knows when its `kind` is this one.
+    /// Returns the keys of a table of this `kind`.
     pub fn keys(self, kind: Option<&str>) -> Vec<&'s str> {
         let fitting = self.alternatives().filter(|a| a.agrees(kind)).filter_map(Self::properties);
         let mut keys: Vec<_> = fitting.flat_map(Map::keys).map(String::as_str).collect();
@@ -103,7 +103,7 @@ impl<'s> Section<'s> {
         keys
     }
 
-    /// What a key of it may hold, if it knows the key or takes any.
+    /// Returns the schema of a key, if the section has the key or accepts any key.
     pub fn field(self, name: &str, kind: Option<&str>) -> Option<Self> {
         let fitting = || self.alternatives().filter(|a| a.agrees(kind));
         let known = fitting().find_map(|a| a.properties()?.get(name));
@@ -111,24 +111,24 @@ impl<'s> Section<'s> {
         known.or_else(any).map(|named| Self { root: self.root, named })
     }
 
-    /// Whether it is a table whose keys can be checked.
+    /// Returns whether it is a table whose keys can be checked.
     pub fn is_table(self) -> bool {
         self.alternatives().any(|a| a.properties().is_some() || a.named.get("additionalProperties").is_some())
     }
 
-    /// The kinds of table it may be, where it has a `kind`.
+    /// Returns the accepted values of `kind`.
     pub fn kinds(self) -> Vec<&'s str> {
         self.alternatives().filter_map(|a| a.named.pointer("/properties/kind/const")?.as_str()).collect()
     }
 
-    /// The words it may be, where it is one of a few.
+    /// Returns the accepted words.
     pub fn words(self) -> Vec<&'s str> {
         let lists = self.alternatives().filter_map(|a| a.named.get("enum")?.as_array()).flatten();
         let single = self.alternatives().filter_map(|a| a.named.get("const"));
         single.chain(lists).filter_map(Value::as_str).collect()
     }
 
-    /// The words that it may be, or the kinds of table, each with what it means.
+    /// Returns the accepted words or kinds, each with its documentation.
     pub fn choices(self) -> impl Iterator<Item = (&'s str, &'s str)> {
         self.alternatives().filter_map(|a| {
             let word = a.named.get("const").or_else(|| a.named.pointer("/properties/kind/const"))?;
@@ -136,23 +136,37 @@ impl<'s> Section<'s> {
         })
     }
 
-    /// The JSON types it may have; empty if it does not say.
+    /// Returns the accepted JSON types; empty if the schema has none.
     pub fn types(self) -> Vec<&'s str> {
         self.alternatives().filter_map(|a| a.named.get("type")?.as_str()).collect()
     }
 
-    /// Whether it is a number or a distribution.
+    /// Returns whether it is a number or a distribution.
     pub fn is_number(self) -> bool {
         self.types().contains(&"number")
     }
 
-    /// What it means, in the words of its documentation.
+    /// Returns the documentation.
     pub fn meaning(self) -> Option<&'s str> {
         let text = |value: &'s Value| value.get("description").and_then(Value::as_str);
         text(self.named).or_else(|| text(self.schema()))
     }
 
-    /// What would be accepted, in a few words.
+    /// Returns the type that is accepted, with an article.
+    pub fn expected_type(self) -> &'static str {
+        match self.types().first().copied() {
+            _ if self.is_number() => "a number",
+            _ if !self.words().is_empty() => "a string",
+            _ if self.is_table() => "a table",
+            Some("integer") => "an integer",
+            Some("string") => "a string",
+            Some("boolean") => "a boolean",
+            Some("array") => "an array",
+            _ => "another type",
+        }
+    }
+
+    /// Returns what is accepted, in a few words.
     pub fn expected(self) -> String {
         let words = self.words();
         if self.field(PER_MM2, None).is_some() {
@@ -166,8 +180,8 @@ impl<'s> Section<'s> {
             format!("a table whose `kind` is one of {}", quoted(self.kinds()))
         } else {
             match self.types().first().copied() {
-                Some("integer") => "a whole number".to_owned(),
-                Some("string") => "a text in quotes".to_owned(),
+                Some("integer") => "an integer".to_owned(),
+                Some("string") => "a string".to_owned(),
                 Some("object") if self.keys(None).is_empty() => "a table".to_owned(),
                 Some("object") => format!("a table of {}", quoted(self.keys(None))),
                 other => other.unwrap_or("something else").to_owned(),
@@ -176,7 +190,7 @@ impl<'s> Section<'s> {
     }
 }
 
-/// Names in backticks, separated by commas.
+/// Returns names in backticks, separated by commas.
 pub fn quoted<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     names.into_iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
