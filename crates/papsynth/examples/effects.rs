@@ -11,7 +11,7 @@ mod support;
 use image::{Rgb, RgbImage};
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{CellMix, Debris, Layout, Preset, Recipe, is_toml_table};
+use papsynth::recipe::{CellMix, Clusters, Debris, Layout, Number, Preset, Recipe, is_toml_table};
 use papsynth::{Engine, Inputs};
 use serde_json::{Map, Value, json};
 use support::{LINE, Outcome, enlarged, save, to_image, write};
@@ -152,7 +152,8 @@ fn base(section: &str) -> Recipe {
         // At default densities, a small field contains hardly any debris.
         "debris" => recipe = abundant(&recipe),
         "layout" => {
-            recipe.layout = Preset::Lbc.recipe().layout;
+            recipe.layout =
+                Layout::Clusters(Clusters { count: Number::uniform(5.0, 11.0).into(), ..Clusters::default() });
             recipe.field.pixel_um = 1.3.into();
             recipe.cells.insert("intermediate".to_owned(), CellMix { count: 20.0.into(), ..CellMix::default() });
         }

@@ -144,7 +144,8 @@ fn range(path: &str, name: &str) -> Option<&'static (&'static str, f64, f64)> {
     })
 }
 
-/// Compares every number with the range of its field, and says where a text or a truth value stands in place of a number.
+/// Compares every number with the range of its field, and says where a text or a truth value stands in place of a
+/// number.
 fn numbers(value: &Value, path: &str, name: &str) -> Result<(), Cause> {
     match value {
         Value::Object(fields) => fields.iter().try_for_each(|(name, value)| {

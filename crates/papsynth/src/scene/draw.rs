@@ -23,8 +23,8 @@ pub const MAX_ATTEMPTS: u32 = 8;
 
 /// Draws the objects of a field and how it is imaged.
 ///
-/// `weight_map` is the image at the `path` of the layout, if it has one. If the cells do not fit, the objects are drawn again, up to
-/// [`MAX_ATTEMPTS`] times; the last time as many cells are placed as fit.
+/// `weight_map` is the image at the `path` of the layout, if it has one. If the cells do not fit, the objects are drawn
+/// again, up to [`MAX_ATTEMPTS`] times; the last time as many cells are placed as fit.
 ///
 /// # Errors
 /// If no draw can succeed: the weight map is missing or too uneven, or there are more objects than labels can number.
