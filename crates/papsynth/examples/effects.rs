@@ -71,7 +71,7 @@ const CHOICES: [(&str, &[&str]); 21] = [
     ("camera.binning", &["charge", "digital"]),
     ("camera.jpeg_subsampling", &["4:4:4", "4:2:2", "4:2:0"]),
     ("layout.kind", &["clusters", "band", "uniform"]),
-    ("background.illumination.kind", &["bowl", "border"]),
+    ("background.illumination.kind", &["quadratic", "border"]),
     ("optics.imaging", &["product", "abbe"]),
     ("optics.kind", &["bright-field", "gaussian"]),
     ("light.kind", &["monochrome", "colour"]),
@@ -81,7 +81,7 @@ const CHOICES: [(&str, &[&str]); 21] = [
 
 /// Probabilities, by the last part of the path: shown at 0 and at 1.
 const PROBABILITIES: [&str; 9] =
-    ["flap", "roll", "cigar", "granular", "pyknotic", "wrinkled", "degenerated", "on_cells", "ghosts"];
+    ["flap", "roll", "folded_over", "granular", "pyknotic", "wrinkled", "degenerated", "on_cells", "ghosts"];
 
 /// A row: a parameter and its recipes.
 struct Row {
