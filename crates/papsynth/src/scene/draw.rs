@@ -73,7 +73,7 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
     Ok(Scene { objects, slide, attempts: attempt + 1, cells: counts, ..empty(recipe, view, &field, &stain) })
 }
 
-/// Draws the coats of the clue cells, and adds the debris, in the field or in the field with its margin. `sieve`
+/// Draws the coats of the clue cells, and adds the debris, in the field or in the field with its margin. `plot_density`
 /// selects the objects of a part of a slide.
 pub(super) fn strew(
     debris: &Debris,
