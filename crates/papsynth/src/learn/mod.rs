@@ -134,12 +134,12 @@ fn shapes(
     if let Some(index) = outlines.iter().position(|outline| fsd_shape::self_intersects(outline)) {
         return Err(Cause::CrossedOutline(index, what));
     }
-    let fit = |spread: Spread| {
-        let params = ShapeModelParams { harmonics, spread };
+    let fit = |covariance: CovarianceModel| {
+        let params = ShapeModelParams { harmonics, covariance };
         let model = ShapeModel::fit(outlines, &params);
         model.and_then(|model| model.statistics().rounded(DIGITS)).map_err(|error| Cause::Outlines(what, error))
     };
-    let correlated = fit(ShapeModelParams::default().spread)?;
+    let correlated = fit(ShapeModelParams::default().covariance)?;
     let radius = LogNormal {
         median: rounded(libm::exp(correlated.ln_radius_mean) * pixel_um),
         log_sd: rounded(correlated.ln_radius_sd),
