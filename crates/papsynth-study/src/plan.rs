@@ -168,7 +168,7 @@ fn patch_number(trial: usize, slot: usize) -> usize {
 
 impl FieldRecord {
     /// Returns the field as shown, before noise.
-    fn write_image(&self, params: &StudyParams, folders: &Folders) -> Result<GreyImage, Error> {
+    fn shown_image(&self, params: &StudyParams, folders: &Folders) -> Result<GreyImage, Error> {
         let field = folders.fields[self.side as usize].iter().find(|field| field.name == self.name);
         let raw = Raw::read(field.ok_or_else(|| self.changed(folders))?)?;
         if hex(&Sha256::digest(&raw.bytes)) != self.sha256 {
@@ -270,7 +270,7 @@ fn reductions(params: &StudyParams, chosen: &[(Side, &Field)], notes: &mut Vec<S
     };
     let sizes: Option<Vec<f64>> = chosen.iter().map(|(side, field)| own(*side, field)).collect();
     let Some(sizes) = sizes else {
-        notes.push("the pixel size of one side is unknown: no field is resampled".to_owned());
+        notes.push("not all pixel sizes are known: no field is resampled".to_owned());
         return vec![1.0; chosen.len()];
     };
     let coarsest = sizes.iter().copied().fold(0.0, f64::max);

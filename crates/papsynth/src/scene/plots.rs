@@ -244,7 +244,7 @@ impl Population {
                     let mut place_rng = field.key.stream("cell", number, "place");
                     let Ok(place) = groups.next(cell.body.radius_um, |_| Ok::<_, Infallible>(origin), &mut place_rng);
                     let depth_um = self.relief.at(global(place.centre_um));
-                    cells.push(cell.lie(kind, number, &place, depth_um));
+                    cells.push(cell.placed(kind, number, &place, depth_um));
                     member += 1;
                     if alone || groups.is_full() {
                         break;
