@@ -135,10 +135,11 @@ pub(crate) struct Bar {
     phase: Mutex<Phase>,
 }
 
-/// The current phase: its name, its steps, and the time of the bar at its begin.
+/// The current phase: its name, its first and last completed steps, and the time of the bar at the first.
 #[derive(Debug, Default)]
 struct Phase {
     name: String,
+    first: u64,
     done: u64,
     total: u64,
     begin: Duration,
@@ -164,17 +165,17 @@ impl Bar {
         let is_later = done <= phase.done;
         let is_repeated = phase.done == phase.total && done == 1;
         if total != phase.total || (is_later && (name != phase.name || is_repeated)) {
-            *phase = Phase { name: name.to_owned(), done, total, begin: self.bar.elapsed() };
-            // The time before the first report of a phase belongs to the phase before.
+            *phase = Phase { name: name.to_owned(), first: done, done, total, begin: self.bar.elapsed() };
             self.bar.set_length(total);
         } else if is_later {
             return;
         }
         (phase.done, phase.name) = (done, name.to_owned());
         let spent = self.bar.elapsed().saturating_sub(phase.begin).as_secs_f64();
-        let left = match done < total && done > 1 && spent > 0.0 {
-            // The first report begins the phase, so `done − 1` steps took this time.
-            true => format!(", about {} left", duration((spent * (total - done) as f64 / (done - 1) as f64).round())),
+        // The time before the first report belongs to the phase before.
+        let steps = done - phase.first;
+        let left = match done < total && steps > 0 {
+            true => format!(", about {} left", duration((spent * (total - done) as f64 / steps as f64).round())),
             false => String::new(),
         };
         self.bar.set_position(done);

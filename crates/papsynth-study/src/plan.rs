@@ -270,7 +270,7 @@ fn reductions(params: &StudyParams, chosen: &[(Side, &Field)], notes: &mut Vec<S
     };
     let sizes: Option<Vec<f64>> = chosen.iter().map(|(side, field)| own(*side, field)).collect();
     let Some(sizes) = sizes else {
-        notes.push("the pixel size of one side is unknown: no field is resampled".to_owned());
+        notes.push("not all pixel sizes are known: no field is resampled".to_owned());
         return vec![1.0; chosen.len()];
     };
     let coarsest = sizes.iter().copied().fold(0.0, f64::max);
