@@ -34,7 +34,9 @@ fn drawn<'py, E: Display + Send>(
     let mut out = match rows.checked_mul(columns) {
         Some(pixels @ 1..=MAX_PIXELS) => vec![0.0; pixels],
         _ => {
-            return Err(wrong(format!("shape: ({rows}, {columns}) is out of range: expected 1 to {MAX_PIXELS} pixels")));
+            return Err(wrong(format!(
+                "shape: ({rows}, {columns}) is out of range: expected 1 to {MAX_PIXELS} pixels"
+            )));
         }
     };
     py.detach(|| draw(&mut out)).map_err(wrong)?;
