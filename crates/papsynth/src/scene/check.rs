@@ -16,7 +16,7 @@ const MOST_PIXELS: usize = 1 << 30;
 /// Largest radius of an object, in points of the grid on which it is rendered.
 const FARTHEST_POINTS: f64 = 8192.0;
 
-/// Largest distance of its centre from the corner of the image, in such radii.
+/// Largest distance of the centre of an object from the corner of the image, in largest radii.
 const MOST_REACHES: f64 = 512.0;
 
 /// Range of each number, by the name of its field or by the end of its path. For lists it applies to each number.
@@ -144,8 +144,7 @@ fn range(path: &str, name: &str) -> Option<&'static (&'static str, f64, f64)> {
     })
 }
 
-/// Compares every number with the range of its field, and says where a text or a truth value stands in place of a
-/// number.
+/// Checks the range of every number, and that no string or boolean is in place of a number.
 fn numbers(value: &Value, path: &str, name: &str) -> Result<(), Cause> {
     match value {
         Value::Object(fields) => fields.iter().try_for_each(|(name, value)| {
@@ -188,7 +187,7 @@ mod tests {
     }
 
     fn all_have_a_range(value: &Value, path: &str, name: &str) {
-        /// Any whole number of 32 or 64 bits.
+        /// Any integer of 32 or 64 bits.
         const ANY: [&str; 6] = ["seed", "index", "slide", "serial", "number", "cluster"];
         match value {
             Value::Object(fields) => {
