@@ -24,7 +24,8 @@ fn collection(field: &Field) -> Value {
     let (seed, index) = (field.seed, field.frame.index);
     let name = |o: &ObjectTruth| format!("papsynth {seed} {index} {} {:?}", o.id, o.part);
     let measure = |object: &ObjectTruth, nucleus: Option<&ObjectTruth>| {
-        let mut all = json!({ "Area µm^2": object.area_um2, "Depth µm": object.depth_um, "Stain": object.mean_absorbance });
+        let mut all =
+            json!({ "Area µm^2": object.area_um2, "Depth µm": object.depth_um, "Stain": object.mean_absorbance });
         if let Some(nucleus) = nucleus {
             all["Nucleus: Area µm^2"] = nucleus.area_um2.into();
             all["Nucleus: Stain"] = nucleus.mean_absorbance.into();

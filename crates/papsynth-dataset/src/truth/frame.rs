@@ -138,7 +138,8 @@ pub struct Category {
 /// The categories of a recipe, the same whatever frames are made of it.
 pub(crate) fn categories(recipe: &Recipe) -> Vec<Category> {
     let cells = recipe.cells.keys().flat_map(|class| [(class.as_str(), Part::Cytoplasm), (class, Part::Nucleus)]);
-    let others = ObjectKind::ALL.into_iter().filter(|&kind| kind != ObjectKind::Cell).map(|kind| (kind.name(), Part::Whole));
+    let others =
+        ObjectKind::ALL.into_iter().filter(|&kind| kind != ObjectKind::Cell).map(|kind| (kind.name(), Part::Whole));
     (1..)
         .zip(cells.chain(others))
         .map(|(id, (class, part))| Category {
