@@ -118,6 +118,8 @@ pub(crate) fn scene(index: u64, planes: usize, bits: u32) -> Scene {
             jpeg_subsampling: Subsampling::S420,
         },
         frame: None,
+        attempts: 1,
+        cells: std::collections::BTreeMap::new(),
         objects: Vec::new(),
     }
 }
