@@ -10,15 +10,16 @@ use anyhow::{Result, bail, ensure};
 use crate::bench::counts;
 use crate::shell::{self, Skipped, skipped};
 use crate::workspace::Workspace;
-use crate::{browser, dataset, deps, equations, external, hashes, package, supply, test};
+use crate::{browser, dataset, deps, equations, external, hashes, package, prose, supply, test};
 
 type Step = (&'static str, fn(&Workspace) -> Result<()>);
 
 /// In order of increasing time. The golden images are part of the tests.
-const STEPS: [Step; 12] = [
+const STEPS: [Step; 13] = [
     ("format", |workspace| shell::run(workspace.cargo().args(["fmt", "--all", "--check"]))),
     ("dependencies", deps::run),
     ("equations", equations::run),
+    ("prose", prose::run),
     ("reference images", |_| reference_images()),
     ("lints", |workspace| lints(workspace.cargo_light(&["clippy"]))),
     ("documentation", |workspace| documentation(workspace.cargo_light(&["doc"]))),

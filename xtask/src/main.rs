@@ -14,6 +14,7 @@ mod figures;
 mod hashes;
 mod package;
 mod peers;
+mod prose;
 mod python;
 mod realism;
 mod shell;
@@ -96,6 +97,8 @@ enum DevCommand {
     /// lines that compute an equation. Citations at fields do not count, nor do equations of another source, which
     /// follow its DOI.
     Equations,
+    /// Checks the line width and the words of comments and Markdown
+    Prose,
     /// Checks and prints the dependencies between crates of the workspace, including those of tests
     ///
     /// xtask/src/deps.rs contains the rules, ARCHITECTURE.md the reasons.
@@ -198,6 +201,7 @@ fn run(command: DevCommand) -> Result<()> {
         DevCommand::Figures { wanted } => figures::run(workspace, &wanted),
         DevCommand::Realism { quick } => realism::run(workspace, quick),
         DevCommand::Equations => equations::run(workspace),
+        DevCommand::Prose => prose::run(workspace),
         DevCommand::Deps => deps::run(workspace),
         DevCommand::External { full } => external::run(workspace, full),
         DevCommand::Browser => browser::run(workspace),

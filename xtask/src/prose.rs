@@ -11,8 +11,17 @@ use crate::workspace::Workspace;
 const WIDTH: usize = 120;
 
 /// Words that attribute intentions or knowledge to code, or have a plainer equivalent.
-const AVOIDED: [&str; 9] =
-    ["whoever", "whatever", "nobody", "somebody", "gives way", "is none of", "truth value", "beside others", "lies within"];
+const AVOIDED: [&str; 9] = [
+    "whoever",
+    "whatever",
+    "nobody",
+    "somebody",
+    "gives way",
+    "is none of",
+    "truth value",
+    "beside others",
+    "lies within",
+];
 
 /// Checks all tracked Rust and Markdown files.
 pub(crate) fn run(workspace: &Workspace) -> Result<()> {
@@ -23,7 +32,8 @@ pub(crate) fn run(workspace: &Workspace) -> Result<()> {
         // A deleted file stays in the index until the next commit.
         if path.is_file() {
             let check = if file.ends_with(".md") { markdown } else { rust };
-            findings.extend(check(&shell::read(&path)?).into_iter().map(|(line, what)| format!("{file}:{line}: {what}")));
+            findings
+                .extend(check(&shell::read(&path)?).into_iter().map(|(line, what)| format!("{file}:{line}: {what}")));
         }
     }
     ensure!(findings.is_empty(), "{} lines to rewrite:\n{}", findings.len(), findings.join("\n"));
