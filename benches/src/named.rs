@@ -6,8 +6,8 @@ use cloth_verlet::ClothParams;
 
 use crate::cell::SHEETS;
 use crate::{
-    FRAME, Size, Workload, at_density, blur, cytoskeleton, default_files, default_recipe, exposure, fields, gibson_lanni,
-    peer_recipe, perlin, sheets, texture,
+    FRAME, Size, Workload, at_density, blur, cytoskeleton, default_files, default_recipe, exposure, fields,
+    gibson_lanni, peer_recipe, perlin, sheets, texture,
 };
 
 /// A workload and the number of parts that its time is divided by.

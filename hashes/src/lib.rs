@@ -5,7 +5,7 @@
 use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::{
-    CameraPreset, Clusters, Colour, Imaging, Layout, Light, Microscope, Mixing, Number, Optics, Preset, Recipe,
+    CameraPreset, Clusters, Colour, Imaging, Layout, LightSection, Microscope, Mixing, Number, Optics, Preset, Recipe,
     Rendition,
 };
 use papsynth::truth::Group;
@@ -58,8 +58,8 @@ fn recipes() -> Vec<(&'static str, Recipe)> {
     recipes
 }
 
-fn in_colour() -> Light {
-    Light::Colour(Colour {
+fn in_colour() -> LightSection {
+    LightSection::Colour(Colour {
         lamp_k: Number::Fixed(3200.0),
         mixing: Mixing::Spectral,
         chromatic_um: Number::Fixed(0.3),
@@ -73,7 +73,7 @@ fn small(preset: Preset, [width, height]: [u16; 2]) -> Recipe {
     recipe.field.width_px = Number::Fixed(width.into());
     recipe.field.height_px = Number::Fixed(height.into());
     for mix in recipe.cells.values_mut() {
-        mix.count = Number::uniform(1.0, 2.0);
+        mix.count = Number::uniform(1.0, 2.0).into();
     }
     if let Layout::Clusters(Clusters { radius_um, .. }) = &mut recipe.layout {
         *radius_um = Number::Fixed(15.0);

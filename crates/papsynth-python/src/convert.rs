@@ -44,7 +44,9 @@ fn value(value: &Bound<'_, PyAny>, path: &str, depth: usize) -> PyResult<Value> 
     }
     if value.is_instance_of::<PyInt>() {
         let whole = value.extract::<i64>();
-        return whole.map(Value::Integer).map_err(|_| wrong(format!("{path}: {} is out of range: expected a 64-bit integer", repr(value))));
+        return whole
+            .map(Value::Integer)
+            .map_err(|_| wrong(format!("{path}: {} is out of range: expected a 64-bit integer", repr(value))));
     }
     if value.is_instance_of::<PyFloat>() {
         return Ok(Value::Float(value.extract()?));

@@ -307,7 +307,19 @@ pub(crate) fn restored(
         return Err(damaged("array shapes do not match"));
     }
     let truth = restored_truth([width, height], planes_um.len(), objects)?;
-    Ok(Frame { seed, index, slide, pixel_um, planes_um, bits, image, stack, noise_free, truth, cache: Cache::default() })
+    Ok(Frame {
+        seed,
+        index,
+        slide,
+        pixel_um,
+        planes_um,
+        bits,
+        image,
+        stack,
+        noise_free,
+        truth,
+        cache: Cache::default(),
+    })
 }
 
 /// Returns a cached value, or computes and caches it.

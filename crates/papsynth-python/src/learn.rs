@@ -60,7 +60,9 @@ fn nucleus(number: usize, image: &ArrayLike<'_>, mask: &ArrayLike<'_>) -> PyResu
     let (mask, mask_width) = pixels_within(&format!("{name}[1]"), mask, [0.0, 1.0])?;
     if (light.len(), width) != (mask.len(), mask_width) {
         let [image, mask] = [(&light, width), (&mask, mask_width)].map(|(values, width)| (values.len() / width, width));
-        return Err(wrong(format!("{name}: the image has the shape {image:?} and the mask {mask:?}; expected equal shapes")));
+        return Err(wrong(format!(
+            "{name}: the image has the shape {image:?} and the mask {mask:?}; expected equal shapes"
+        )));
     }
     let mask = mask.into_iter().map(|inside| if inside > 0.5 { 1.0 } else { 0.0 }).collect();
     Ok(NucleusImage { name, light, mask, width })
@@ -104,7 +106,8 @@ pub(crate) fn judge(
         field_images("real", &real, real_nuclei.as_deref(), full_scale)?,
         field_images("synthetic", &synthetic, synthetic_nuclei.as_deref(), full_scale)?,
     ];
-    let measurer = Measurer::new(&MeasurerParams { pixel_um, nuclei_from, ..MeasurerParams::default() }).map_err(wrong)?;
+    let measurer =
+        Measurer::new(&MeasurerParams { pixel_um, nuclei_from, ..MeasurerParams::default() }).map_err(wrong)?;
     let params = if quick { JudgeParams::quick() } else { JudgeParams::default() };
     let judge = Judge::new(&JudgeParams { seed, ..params }).map_err(wrong)?;
     let pool = pool::of(py, threads)?;

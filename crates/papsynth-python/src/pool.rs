@@ -25,7 +25,8 @@ pub(crate) fn of(py: Python<'_>, threads: usize) -> PyResult<Arc<ThreadPool>> {
     if threads > MAX_THREADS {
         return Err(wrong(format!("threads: {threads} is out of range: expected 0 to {MAX_THREADS}")));
     }
-    if let Some(ProcessPool { process, threads: found, pool }) = POOL.lock().unwrap_or_else(PoisonError::into_inner).as_ref()
+    if let Some(ProcessPool { process, threads: found, pool }) =
+        POOL.lock().unwrap_or_else(PoisonError::into_inner).as_ref()
         && *process == process::id()
         && *found == threads
     {

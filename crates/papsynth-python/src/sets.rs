@@ -109,10 +109,11 @@ pub(crate) fn generate<'py>(
     if let Some(error) = interrupted {
         return Err(error);
     }
-    let outcome = outcome.map_err(|_| wrong("internal error: a worker thread panicked"))?.map_err(|error| match error {
-        papsynth_dataset::Error::Engine(error) => error::engine(py, &made_by.source, &error),
-        other => error::dataset(&other),
-    })?;
+    let outcome =
+        outcome.map_err(|_| wrong("internal error: a worker thread panicked"))?.map_err(|error| match error {
+            papsynth_dataset::Error::Engine(error) => error::engine(py, &made_by.source, &error),
+            other => error::dataset(&other),
+        })?;
     [("written", outcome.written), ("present", outcome.present)].into_py_dict(py)
 }
 
@@ -182,8 +183,9 @@ pub(crate) fn missing(py: Python<'_>, out: PathBuf, frames: u64) -> PyResult<Vec
 #[pyfunction]
 #[pyo3(signature = (out, frames=None))]
 pub(crate) fn verify(py: Python<'_>, out: PathBuf, frames: Option<u64>) -> PyResult<Bound<'_, PyDict>> {
-    let report =
-        py.detach(|| Location::at(&out).and_then(|location| papsynth_dataset::verify(&location, frames.map(|frames| 0..frames))));
+    let report = py.detach(|| {
+        Location::at(&out).and_then(|location| papsynth_dataset::verify(&location, frames.map(|frames| 0..frames)))
+    });
     let report = report.map_err(|error| error::dataset(&error))?;
     let result = PyDict::new(py);
     result.set_item("root", report.root)?;

@@ -33,7 +33,11 @@ fn drawn<'py, E: Display + Send>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let mut out = match rows.checked_mul(columns) {
         Some(pixels @ 1..=MAX_PIXELS) => vec![0.0; pixels],
-        _ => return Err(wrong(format!("shape: ({rows}, {columns}) is out of range: expected 1 to {MAX_PIXELS} pixels"))),
+        _ => {
+            return Err(wrong(format!(
+                "shape: ({rows}, {columns}) is out of range: expected 1 to {MAX_PIXELS} pixels"
+            )));
+        }
     };
     py.detach(|| draw(&mut out)).map_err(wrong)?;
     image(py, out, columns)

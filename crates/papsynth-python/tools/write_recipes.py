@@ -168,7 +168,7 @@ def text(schema):
     # Aliases refer to classes, so they follow them.
     aliases = [part for part in writer.text if not part.startswith("\n@dataclass")]
     classes = [part for part in writer.text if part.startswith("\n@dataclass")]
-    names = sorted({*writer.written, "Number", "Section", "Recipe", "uniform", "normal", "log_normal", "choice"})
+    names = sorted({*writer.written, "Number", "Abundance", "Section", "Recipe", "uniform", "normal", "log_normal", "choice", "per_mm2"})
     listed = "\n__all__ = [\n" + "".join(f'    "{name}",\n' for name in names) + "]\n"
     return HEAD + "\n".join(classes) + "\n" + "\n".join(aliases) + listed
 

@@ -17,8 +17,8 @@ use crate::transmit::MicroscopeCache;
 /// Inputs that a recipe refers to.
 #[derive(Debug, Clone, Default)]
 pub struct Inputs {
-    /// The image at `layout.path`. For [`Layout::DensityMap`](crate::recipe::Layout::DensityMap) grey levels from 0 to 1; for
-    /// [`Layout::Labels`](crate::recipe::Layout::Labels) 1 where there is a label, else 0.
+    /// The image at `layout.path`. For [`Layout::DensityMap`](crate::recipe::Layout::DensityMap) grey levels from 0 to
+    /// 1; for [`Layout::Labels`](crate::recipe::Layout::Labels) 1 where there is a label, else 0.
     pub weight_map: Option<WeightMap>,
     /// Accumulates the durations of the stages.
     pub profile: Option<Arc<Profile>>,
@@ -67,12 +67,14 @@ impl Engine {
     /// Draws the objects of a field and how it is imaged.
     ///
     /// # Errors
-    /// If no draw can succeed, as when the layout is too uneven. Cells that do not fit are no error: see [`Scene::cells`].
+    /// If no draw can succeed, as when the layout is too uneven. Cells that do not fit are no error: see
+    /// [`Scene::cells`].
     pub fn scene(&self, key: Key) -> Result<Scene, Error> {
         self.assets.timer.time(Stage::Scene, || scene::draw(self.recipe(), &self.model, self.weight_map.as_ref(), key))
     }
 
-    /// Generates an image with ground truth, and passes each plane to `sink` when it is finished. The memory of a plane is reused.
+    /// Generates an image with ground truth, and passes each plane to `sink` when it is finished. The memory of a plane
+    /// is reused.
     ///
     /// # Errors
     /// The error of `sink`, or of the scene.

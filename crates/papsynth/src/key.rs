@@ -10,8 +10,8 @@ use sha2::{Digest, Sha256};
 /// The generator of all streams: xoshiro256++, whose output is determined by its 256-bit state.
 pub type Stream = Xoshiro256PlusPlus;
 
-/// Version of the mapping from keys to numbers, and from numbers to images. It changes if the same recipe, model, seed and index
-/// give another image, and is recorded in each data set.
+/// Version of the mapping from keys to numbers, and from numbers to images. It changes if the same recipe, model, seed
+/// and index give another image, and is recorded in each data set.
 pub const STREAM_VERSION: u32 = 5;
 
 /// The last [`STREAM_VERSION`] that changed the random numbers.
@@ -53,8 +53,8 @@ impl Key {
 
     /// Returns the stream of a purpose of an object.
     ///
-    /// `kind` is the kind of object ("cell", "speckle", …, or "field" for the complete image), `object` its number within the
-    /// kind, `purpose` the use of the numbers.
+    /// `kind` is the kind of object ("cell", "speckle", …, or "field" for the complete image), `object` its number
+    /// within the kind, `purpose` the use of the numbers.
     #[must_use]
     pub fn stream(&self, kind: &str, object: u64, purpose: &str) -> Stream {
         let mut hash = Sha256::new();

@@ -1,9 +1,10 @@
 //! Whole slides, larger than memory: any part of a slide can be generated alone.
 //!
-//! The engine images a slide frame by frame, like the camera of a scanner. Frames form a grid that starts at the first pixel of
-//! the slide. Each frame is illuminated and exposed separately, with a border that is cropped. Objects are drawn per plot,
-//! independently of frames (`scene/plots.rs`), and each object is imaged in a separate patch, so that frames join without seams.
-//! A part of the slide is cropped from the frames that it overlaps: its size and position do not change a pixel.
+//! The engine images a slide frame by frame, like the camera of a scanner. Frames form a grid that starts at the first
+//! pixel of the slide. Each frame is illuminated and exposed separately, with a border that is cropped. Objects are
+//! drawn per plot, independently of frames (`scene/plots.rs`), and each object is imaged in a separate patch, so that
+//! frames join without seams. A part of the slide is cropped from the frames that it overlaps: its size and position do
+//! not change a pixel.
 
 use std::sync::Arc;
 
@@ -59,13 +60,13 @@ pub struct SlidePart {
     pub size_px: [u32; 2],
     /// Focal planes.
     pub planes: Vec<PartPlane>,
-    /// Label maps of cytoplasm, nuclei and debris, in the order of [`Group::ALL`]: the id of the topmost object at each pixel, 0
-    /// if there is none. Dirt has no ids.
+    /// Label maps of cytoplasm, nuclei and debris, in the order of [`Group::ALL`]: the id of the topmost object at each
+    /// pixel, 0 if there is none. Dirt has no ids.
     pub labels: Vec<LabelMap>,
     /// Number of overlapping cytoplasms at each pixel.
     pub layers: Vec<u16>,
-    /// Ground truth of each object whose centre is in this part, and of each part of a cell. Masks and places are in pixels of the
-    /// slide; masks are complete, also outside this part. Visible masks are empty: see `labels`.
+    /// Ground truth of each object whose centre is in this part, and of each part of a cell. Masks and places are in
+    /// pixels of the slide; masks are complete, also outside this part. Visible masks are empty: see `labels`.
     pub objects: Vec<ObjectTruth>,
 }
 
@@ -197,7 +198,8 @@ impl<'a> Slide<'a> {
         Error::Image { index: self.number, cause }
     }
 
-    /// Returns the objects that reach into the rectangle of the slide from `low` to `high`. Positions of plots are relative to `low`.
+    /// Returns the objects that reach into the rectangle of the slide from `low` to `high`. Positions of plots are
+    /// relative to `low`.
     fn reaching(&self, low: [i64; 2], high: [i64; 2]) -> Result<Vec<Object>, Cause> {
         let pixel_um = self.pixel_um();
         let most_um = self.engine.recipe().scan.max_object_radius_um;

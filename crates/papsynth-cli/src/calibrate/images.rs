@@ -79,8 +79,7 @@ pub(super) fn camera(args: &Calibrate, folder: &Path) -> Result<Camera, ExitErro
     let mut flats = Flats::new(bits).map_err(|error| ExitError::with_help(format!("--bits: {error}"), "8 to 16"))?;
     for Exposure { name, files, light } in &exposures {
         // Memory holds one level at a time.
-        let images =
-            files.iter().map(|file| GreyImage::read(file, &lossless())).collect::<Result<Vec<_>, _>>()?;
+        let images = files.iter().map(|file| GreyImage::read(file, &lossless())).collect::<Result<Vec<_>, _>>()?;
         let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
         let frames: Vec<Frame> = (names.iter().zip(&images))
             .map(|(name, image)| Frame { name, grey: &image.grey, width: image.width })

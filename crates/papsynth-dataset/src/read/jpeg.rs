@@ -34,10 +34,19 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Problem> {
     };
     decoder.set_options(options.jpeg_set_out_colorspace(space));
     let samples = decoder.decode().map_err(problem)?;
+    if !ends(bytes) {
+        return Err(Problem::Truncated("JPEG"));
+    }
     if samples.len() != width * height * channels.count() {
         return Err(Problem::broken("JPEG", format!("{} samples for {width} x {height} pixels", samples.len())));
     }
     Ok(Raster { width, channels, samples: Samples::U8(samples) })
+}
+
+/// Whether there is an end marker after the last start of a scan. The decoder does not notice a cut in the last rows.
+fn ends(bytes: &[u8]) -> bool {
+    let last = |marker: u8| bytes.windows(2).rposition(|pair| *pair == [0xff, marker]);
+    last(0xd9) > last(0xda)
 }
 
 /// Checks whether JPEG is allowed, and the size in every frame header of a JPEG stream, because the decoder allocates

@@ -149,7 +149,8 @@ pub struct Category {
 /// Returns the categories of a recipe. They are the same for all of its frames.
 pub(crate) fn categories(recipe: &Recipe) -> Vec<Category> {
     let cells = recipe.cells.keys().flat_map(|class| [(class.as_str(), Part::Cytoplasm), (class, Part::Nucleus)]);
-    let others = ObjectKind::ALL.into_iter().filter(|&kind| kind != ObjectKind::Cell).map(|kind| (kind.name(), Part::Whole));
+    let others =
+        ObjectKind::ALL.into_iter().filter(|&kind| kind != ObjectKind::Cell).map(|kind| (kind.name(), Part::Whole));
     (1..)
         .zip(cells.chain(others))
         .map(|(id, (class, part))| Category {

@@ -85,7 +85,7 @@ fn converted_data_sets_equal_those_written_directly() {
         to(folder.path(), tars.path(), &layout).unwrap();
         let deep = Layout::new([Format::Cellpose, Format::Qupath, Format::OmeTiff]);
         let layout = if bits > 8 {
-            let error = to(tars.path(), &twice.join("deep"), &deep).unwrap_err().to_string();
+            let error = to(tars.path(), name("deep").path(), &deep).unwrap_err().to_string();
             let expected = format!("the format `ome-tiff` needs {bits} bits, but `webdataset` has 8");
             assert!(error.contains(&expected), "{error}");
             Layout::new([Format::Cellpose, Format::YoloSeg])

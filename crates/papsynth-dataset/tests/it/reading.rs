@@ -176,8 +176,8 @@ fn jpeg_files_are_read_alone_and_in_tiff() {
         assert!(worst <= tolerance && sum <= 2 * found.len(), "{name}: {worst}, {sum}");
         for length in 0..bytes.len() {
             let read = LevelImage::decode(&bytes[..length], &Limits::default());
-            // Readers accept a JPEG without the end marker, and the tags at the end of a TIFF may be optional.
-            assert!(read.is_err() || length + 3 > bytes.len() || name.ends_with("tif"), "{name}: {length} bytes");
+            // Values of optional tags may be at the end of a TIFF.
+            assert!(read.is_err() || name.ends_with("tif"), "{name}: {length} bytes");
         }
     }
     assert_eq!(Stack::decode(&corpus("jpeg-grey.tif"), &Limits::default()).unwrap().width, 40);

@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use papsynth::key::Key;
 use papsynth::recipe::{Binning, Mixing, PhotonNoise, Recipe, Rendition, Restore, Subsampling};
 use papsynth::scene::{
-    ObjectKind, Restoration, Scene, SceneBackground, SceneCamera, SceneDyes, SceneIllumination, SceneLight, SceneOptics,
-    Tint, View,
+    ObjectKind, Restoration, Scene, SceneBackground, SceneCamera, SceneDyes, SceneIllumination, SceneLight,
+    SceneOptics, Tint, View,
 };
 use papsynth::truth::{Group, Mask, ObjectTruth, Part, Run, Trait, Truth, visible_masks};
 use papsynth::{Finished, Frame, Plane};
@@ -132,7 +132,15 @@ fn disc(x: f32, y: f32, radius: f32) -> Mask {
     Mask::from_tile(&tile, WIDTH, [0, 0], WIDTH, HEIGHT, |v| v > 0.5)
 }
 
-fn object(id: u32, part: Part, kind: ObjectKind, class: &str, depth_um: f64, planes: &[f64], amodal: Mask) -> ObjectTruth {
+fn object(
+    id: u32,
+    part: Part,
+    kind: ObjectKind,
+    class: &str,
+    depth_um: f64,
+    planes: &[f64],
+    amodal: Mask,
+) -> ObjectTruth {
     ObjectTruth {
         id,
         part,

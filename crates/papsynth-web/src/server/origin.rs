@@ -36,7 +36,9 @@ impl OriginCheck {
         // Browsers send the origin of a page of another site.
         let own = |origin: &[u8]| self.is_own(origin.strip_prefix(b"http://").unwrap_or_default());
         let origin = headers.get(ORIGIN).map(HeaderValue::as_bytes);
-        origin.is_some_and(|origin| !own(origin)).then(|| Reply::error(403, "requests from pages of other sites are rejected"))
+        origin
+            .is_some_and(|origin| !own(origin))
+            .then(|| Reply::error(403, "requests from pages of other sites are rejected"))
     }
 
     fn is_own(&self, host: &[u8]) -> bool {

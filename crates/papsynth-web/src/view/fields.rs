@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use super::grid::Grid;
 use super::labels::{Ids, colour_text};
 use super::levels::Levels;
-use super::source::{TileIndex, ImageInfo, Source, check_pixel, check_plane, png};
+use super::source::{ImageInfo, Source, TileIndex, check_pixel, check_plane, png};
 use crate::server::Reply;
 
 /// Size of a tile, px.
@@ -159,8 +159,7 @@ impl Source for DatasetSource {
     fn tile(&mut self, image: usize, plane: usize, at: TileIndex) -> Result<Reply, Reply> {
         let region = self.frame(image)?.grid.region(at.level, at.row, at.column)?;
         let frame = self.with_plane(image, plane)?;
-        let levels =
-            frame.planes.get(&plane).ok_or_else(|| Reply::error(500, &format!("plane {plane} is missing")))?;
+        let levels = frame.planes.get(&plane).ok_or_else(|| Reply::error(500, &format!("plane {plane} is missing")))?;
         png(&levels.part(at.level, &region), region.width(), frame.summary.channels)
     }
 

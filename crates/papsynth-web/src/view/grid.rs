@@ -31,10 +31,7 @@ impl Grid {
 
     pub(crate) fn size(&self, level: usize) -> Result<[usize; 2], Reply> {
         if level >= self.levels {
-            return Err(Reply::error(
-                404,
-                &format!("no level {level}: expected 0 to {}", self.levels - 1),
-            ));
+            return Err(Reply::error(404, &format!("no level {level}: expected 0 to {}", self.levels - 1)));
         }
         Ok([self.width, self.height].map(|side| side.div_ceil(1 << level)))
     }

@@ -1,6 +1,6 @@
 //! Pyramids of 8-bit images.
 
-use super::grid::{Region, Grid};
+use super::grid::{Grid, Region};
 
 /// An 8-bit image at all levels.
 #[derive(Debug)]

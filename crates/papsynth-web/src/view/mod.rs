@@ -18,7 +18,7 @@ use crate::error::Error;
 use crate::page::{self, CSS, File, HTML, JS};
 use crate::server::{Reply, Request, Site};
 use fields::DatasetSource;
-use source::{TileIndex, Source};
+use source::{Source, TileIndex};
 
 const PAGE: [File; 4] = [
     ("/", HTML, include_str!("page/index.html")),
@@ -64,7 +64,8 @@ impl Viewer {
             }
             ["label", image, group, level, name] => {
                 let group = Group::ALL.into_iter().find(|known| known.name() == group);
-                let group = group.ok_or_else(|| Reply::error(404, "unknown label group: expected cytoplasm, nucleus or debris"))?;
+                let group = group
+                    .ok_or_else(|| Reply::error(404, "unknown label group: expected cytoplasm, nucleus or debris"))?;
                 self.source.label(number(image)?, group, place(level, name)?)
             }
             ["at", image, x, y] => {
@@ -98,13 +99,18 @@ fn source(path: &Path) -> Result<(&'static str, Box<dyn Source>), Error> {
     }
     if !path.join("manifest.json").is_file() {
         let what = if path.is_dir() { "contains neither a data set nor a slide" } else { "no such folder" };
-        return Err(folder(path, format!("{what}; expected a folder that `papsynth generate` or `papsynth slide make` wrote")));
+        return Err(folder(
+            path,
+            format!("{what}; expected a folder that `papsynth generate` or `papsynth slide make` wrote"),
+        ));
     }
     let dataset = Dataset::open(path)?;
     let formats = &dataset.layout().formats;
     let needs: Option<Vec<&str>> = formats.iter().map(|format| format.needs()).collect();
     match needs.as_deref() {
-        Some([feature, ..]) => Err(folder(path, format!("the format {} needs {}", formats[0].name(), built_with(feature)))),
+        Some([feature, ..]) => {
+            Err(folder(path, format!("the format {} needs {}", formats[0].name(), built_with(feature))))
+        }
         _ => Ok(("data set", Box::new(DatasetSource::new(dataset)))),
     }
 }

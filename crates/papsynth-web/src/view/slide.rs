@@ -7,10 +7,10 @@ use papsynth_dataset::Error;
 use papsynth_dataset::slide::SlideSet;
 use serde_json::{Value, json};
 
-use super::grid::{Region, Grid};
+use super::grid::{Grid, Region};
 use super::labels::{Ids, colour_text};
 use super::levels::eight_bits;
-use super::source::{TileIndex, ImageInfo, Source, check_pixel, check_plane, png};
+use super::source::{ImageInfo, Source, TileIndex, check_pixel, check_plane, png};
 use crate::server::Reply;
 
 /// Size of a tile, px: that of a chunk, which can only be decoded as a whole.

@@ -45,10 +45,7 @@ fn tiles_are_the_pixels_of_every_plane_in_every_format() {
         );
         for number in (0..frames.len()).chain([0]) {
             let image = ask(&mut view, &format!("/image/{number}"));
-            assert_eq!(
-                (&image["width"], &image["levels"], &image["tile"]),
-                (&json!(300), &json!(2), &json!(256))
-            );
+            assert_eq!((&image["width"], &image["levels"], &image["tile"]), (&json!(300), &json!(2), &json!(256)));
             let planes_um: Vec<f64> = serde_json::from_value(image["planes_um"].clone()).unwrap();
             assert_eq!(planes_um, frames[number].finished.scene.planes_um, "{name}");
             for plane in (0..planes.max(1)).rev() {

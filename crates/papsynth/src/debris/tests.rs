@@ -298,7 +298,7 @@ fn at_most_one_percent_of_debris_exceeds_its_maximum_radius() {
 }
 
 #[test]
-fn at_most_half_a_percent_of_cells_exceeds_its_maximum_radius() {
+fn at_most_one_percent_of_cells_exceeds_its_maximum_radius() {
     let mut beyond = 0;
     let (mut total, mut largest) = (0, 0.0_f64);
     for preset in [Preset::Lbc, Preset::HighGrade, Preset::Endocervical, Preset::Oral, Preset::Atrophic] {

@@ -20,8 +20,8 @@ use super::section::{Bounds, Declared, Part, Value};
 /// count = { per_mm2 = { uniform = [90, 270] } }
 /// ```
 ///
-/// A count is drawn once a field and rounded to the nearest integer. A density is drawn once a field, multiplied by the area,
-/// and rounded up or down at random, so that the mean is exact.
+/// A count is drawn once a field and rounded to the nearest integer. A density is drawn once a field, multiplied by the
+/// area, and rounded up or down at random, so that the mean is exact.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Abundance {
     /// Objects per field, for a field of any size.
@@ -91,7 +91,8 @@ impl Abundance {
         }
     }
 
-    /// Draws the number of objects in an area of `area_mm2`, which is `fields` times the area of a field, before rounding.
+    /// Draws the number of objects in an area of `area_mm2`, which is `fields` times the area of a field, before
+    /// rounding.
     pub(crate) fn draw<R: Rng + ?Sized>(&self, area_mm2: f64, fields: f64, rng: &mut R) -> f64 {
         let factor = if self.is_density() { area_mm2 } else { fields };
         (self.number().draw(rng) * factor).max(0.0)

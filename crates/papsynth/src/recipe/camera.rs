@@ -53,13 +53,13 @@ section! {
         full_well_e: Number = 32_600.0, 10..=10000000;
         /// Standard deviation of the read noise. If pixels differ, its median over pixels.
         read_noise_e: Number = 138.0, 0..=100000, "electrons";
-        /// Root mean square of the read noise over pixels, for pixels that differ as in CMOS: `read_noise_e` to 20 times that
-        /// value. 0 if all pixels have the same read noise.
+        /// Root mean square of the read noise over pixels, for pixels that differ as in CMOS: `read_noise_e` to 20
+        /// times that value. 0 if all pixels have the same read noise.
         read_noise_rms_e: Number = 0.0, 0..=100000, "electrons";
         /// Grey level of a dark pixel.
         offset_dn: Number = 0.0, 0..=4096;
-        /// Fraction of the light of the empty slide that is glare and was subtracted from the image as its black level. The
-        /// noise of the glare remains.
+        /// Fraction of the light of the empty slide that is glare and was subtracted from the image as its black level.
+        /// The noise of the glare remains.
         glare_subtracted: Number = 0.0, 0..=0.8;
         /// Model of photon noise.
         photon_noise: PhotonNoise = PhotonNoise::Exact;

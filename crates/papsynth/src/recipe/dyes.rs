@@ -3,8 +3,9 @@
 use super::section::section;
 
 section! {
-    /// Amounts of dyes at staining strength 1, each as the absorbance at the peak of the dye. The staining strength is given by the
-    /// model and the factors of `stain`. It is the absorbance at 0.57 µm if the absorbances of the amounts add up to 1 there.
+    /// Amounts of dyes at staining strength 1, each as the absorbance at the peak of the dye. The staining strength is
+    /// given by the model and the factors of `stain`. It is the absorbance at 0.57 µm if the absorbances of the amounts
+    /// add up to 1 there.
     #[derive(Copy)]
     pub struct DyeAmounts {
         /// Haematein bound to aluminium, blue-violet, peak near 0.58 µm.

@@ -14,21 +14,22 @@ section! {
         /// Pixel size in the object (the paper: 0.25). Ignored if `magnification` is above 0.
         pixel_um: Number = 0.25, 0.05..=4, "µm";
         /// Magnification from slide to sensor, including relay optics, or 0 to use `pixel_um`. The pixel size is
-        /// `camera.pixel_um` times `camera.binning_px`, divided by the magnification: 6.45 µm at 40 · 0.645 give 0.25 µm.
+        /// `camera.pixel_um` times `camera.binning_px`, divided by the magnification: 6.45 µm at 40 · 0.645 give 0.25
+        /// µm.
         magnification: Number = 0.0, 0..=400;
     }
 }
 
 section! {
-    /// Focal planes, as positions of the stage. With bright-field optics, the depth in focus is the position of the stage times the
-    /// ratio of the refractive indices of mountant and immersion.
+    /// Focal planes, as positions of the stage. With bright-field optics, the depth in focus is the position of the
+    /// stage times the ratio of the refractive indices of mountant and immersion.
     pub struct Focus, drawn as pub(crate) DrawnFocus {
         /// Number of focal planes. 1 gives an image, more give a focus stack.
         planes: Count = 1, 1..=1024;
         /// Distance between planes, as travel of the stage.
         step_um: Number = 0.5, 0.001..=100, "µm";
-        /// Position of the stage at the central plane. At 0 the centre of the slide is in focus; larger values focus nearer to the
-        /// objective.
+        /// Position of the stage at the central plane. At 0 the centre of the slide is in focus; larger values focus
+        /// nearer to the objective.
         centre_um: Number = 0.0, -100..=100, "µm";
         /// Output of the planes.
         output: FocusOutput = FocusOutput::Planes;
@@ -36,8 +37,8 @@ section! {
         noise_correlation_x: Number = 0.2, 0..=0.5;
         /// Correlation of the noise of neighbouring pixels of a column, in an EDF image.
         noise_correlation_y: Number = 0.4, 0..=0.5;
-        /// Half the difference between the correlations of the noise along the two diagonals (down right minus down left), in an
-        /// EDF image. Images that were rotated or shifted by fractions of a pixel have such a difference.
+        /// Half the difference between the correlations of the noise along the two diagonals (down right minus down
+        /// left), in an EDF image. Images that were rotated or shifted by fractions of a pixel have such a difference.
         noise_correlation_diagonal: Number = 0.0, -0.1..=0.1;
     }
 }
@@ -47,8 +48,8 @@ section! {
     pub enum FocusOutput {
         /// One image per plane.
         Planes,
-        /// One image of extended depth of field (EDF): each object as in its sharpest plane, with noise that is correlated between
-        /// neighbouring pixels.
+        /// One image of extended depth of field (EDF): each object as in its sharpest plane, with noise that is
+        /// correlated between neighbouring pixels.
         Edf,
     }
 }
@@ -124,8 +125,8 @@ section! {
         lamp_k: Number = 3200.0, 2000..=10000, "K";
         /// Colour model of the dyes.
         mixing: Mixing = Mixing::Spectral;
-        /// Longitudinal chromatic aberration: distance of the focus of red light (0.65 µm) beyond that of green light (0.55 µm).
-        /// Below 1 for an apochromat.
+        /// Longitudinal chromatic aberration: distance of the focus of red light (0.65 µm) beyond that of green light
+        /// (0.55 µm). Below 1 for an apochromat.
         chromatic_um: Number = 0.3, -10..=10, "µm of stage travel";
         /// Colour rendition of the camera.
         rendition: Rendition = Rendition::Display;
@@ -149,7 +150,8 @@ section! {
     pub enum Rendition {
         /// The three channels of the sensor, white-balanced and linear, for measurements.
         Raw,
-        /// The three channels of the sensor, white-balanced, with the tone curve of sRGB, as most microscope cameras save them.
+        /// The three channels of the sensor, white-balanced, with the tone curve of sRGB, as most microscope cameras
+        /// save them.
         Display,
         /// Colorimetric colours: sRGB primaries and tone curve.
         Srgb,
@@ -160,7 +162,8 @@ section! {
     /// Optics between slide and sensor.
     #[expect(clippy::large_enum_variant, reason = "a recipe has one value of it")]
     pub enum Optics, by default BrightField {
-        /// Partially coherent bright field: the transmission of each slab, filtered by the weak-object transfer function.
+        /// Partially coherent bright field: the transmission of each slab, filtered by the weak-object transfer
+        /// function.
         BrightField(Microscope),
         /// The paper's model: Gaussian blur of the absorbance (Eqs. 13, 14, Fig. 10).
         Gaussian(Gaussians),
@@ -172,8 +175,8 @@ section! {
     pub struct Microscope, drawn as pub SceneMicroscope {
         /// Numerical aperture of the objective, at most `immersion_index` and below `mount_index`.
         na: Number = 0.95, 0.05..=1.6;
-        /// Numerical aperture of the condenser, below `mount_index`. Light beyond `na` is lost. 0.41 gives 0.25 µm of blur per µm
-        /// of stage travel, as in the paper's Fig. 10.
+        /// Numerical aperture of the condenser, below `mount_index`. Light beyond `na` is lost. 0.41 gives 0.25 µm of
+        /// blur per µm of stage travel, as in the paper's Fig. 10.
         condenser_na: Number = 0.41, 0.05..=1.6;
         /// Refractive index of the mountant.
         mount_index: Number = 1.515, 1..=2;
@@ -187,8 +190,8 @@ section! {
         coma: Number = 0.0, -1..=1, "waves";
         /// Astigmatism between rows and columns, root mean square.
         astigmatism: Number = 0.0, -1..=1, "waves";
-        /// Standard deviation of additional blur: relay optics, charge diffusion, vibration. 0.16 gives the edge width measured in
-        /// the paper, 0.9 px.
+        /// Standard deviation of additional blur: relay optics, charge diffusion, vibration. 0.16 gives the edge width
+        /// measured in the paper, 0.9 px.
         extra_blur_um: Number = 0.16, 0..=10, "µm";
         /// Fraction of the light of an empty field that is evenly distributed stray light (glare).
         stray_light: Number = Number::uniform(0.01, 0.04), 0..=0.5;
@@ -208,8 +211,8 @@ section! {
     pub struct Gaussians {
         /// Standard deviation of the blur in focus (the paper: 0.9 px of 0.25 µm).
         sigma_xy_um: Number = 0.225, 0..=20, "µm";
-        /// Increase of the blur with distance from focus. The paper's calibration is 0.25, one pixel of 0.25 µm per µm; its
-        /// sentence read as "µm per µm" gives 1.
+        /// Increase of the blur with distance from focus. The paper's calibration is 0.25, one pixel of 0.25 µm per µm;
+        /// its sentence read as "µm per µm" gives 1.
         sigma_z_um_per_um: Number = 0.25, 0..=10, "µm per µm";
     }
 }
@@ -217,11 +220,11 @@ section! {
 section! {
     /// Imaging model of bright-field optics.
     pub enum Imaging {
-        /// The product of the transmissions of all objects, each filtered by the weak-object transfer function. Accurate to one or
-        /// two per cent of the contrast.
+        /// The product of the transmissions of all objects, each filtered by the weak-object transfer function.
+        /// Accurate to one or two per cent of the contrast.
         Product,
-        /// Abbe's integration over the source, with propagation from slab to slab. The reference, thousands of times slower, for
-        /// small fields.
+        /// Abbe's integration over the source, with propagation from slab to slab. The reference, thousands of times
+        /// slower, for small fields.
         Abbe,
     }
 }

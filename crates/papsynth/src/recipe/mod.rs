@@ -1,8 +1,8 @@
 //! Recipes.
 //!
-//! A recipe describes a slide and how it is imaged. The statistics of cells are in the [`Model`](crate::model::Model). Lengths
-//! are in micrometres, angles in degrees, probabilities from 0 to 1, absorbances decadic (A = −log₁₀ I/I₀, Eq. 11). Every
-//! number may be a distribution: see [`Number`]. Counts may be densities: see [`Abundance`].
+//! A recipe describes a slide and how it is imaged. The statistics of cells are in the [`Model`](crate::model::Model).
+//! Lengths are in micrometres, angles in degrees, probabilities from 0 to 1, absorbances decadic (A = −log₁₀ I/I₀, Eq.
+//! 11). Every number may be a distribution: see [`Number`]. Counts may be densities: see [`Abundance`].
 
 pub(crate) mod abundance;
 pub(crate) mod camera;

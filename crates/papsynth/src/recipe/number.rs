@@ -82,7 +82,8 @@ impl Number {
         Self::drawn(Distribution::Normal(mean, sd))
     }
 
-    /// Returns a log-normal distribution with a median and the standard deviation of the logarithm, cut at 4 standard deviations.
+    /// Returns a log-normal distribution with a median and the standard deviation of the logarithm, cut at 4 standard
+    /// deviations.
     #[must_use]
     pub fn log_normal(median: f64, log_sd: f64) -> Self {
         Self::drawn(Distribution::LogNormal(median, log_sd))
@@ -130,7 +131,8 @@ impl Number {
 
     /// Draws a value.
     pub fn draw<R: Rng + ?Sized>(&self, rng: &mut R) -> f64 {
-        /// Tries before the value is drawn uniformly between the bounds, if nearly the complete distribution is cut off.
+        /// Tries before the value is drawn uniformly between the bounds, if nearly the complete distribution is cut
+        /// off.
         const TRIES: usize = 1000;
         match self {
             Self::Fixed(value) => *value,
@@ -247,7 +249,8 @@ impl Distribution {
         }
     }
 
-    /// Returns the value on the scale on which [`Distribution::at`] is uniform or normal: standard deviations from the centre.
+    /// Returns the value on the scale on which [`Distribution::at`] is uniform or normal: standard deviations from the
+    /// centre.
     fn scaled(&self, value: f64) -> f64 {
         match self {
             Self::Normal(mean, sd) if *sd > 0.0 => (value - mean) / sd,

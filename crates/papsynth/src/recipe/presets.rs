@@ -75,8 +75,8 @@ impl Preset {
 }
 
 impl Recipe {
-    /// Returns the same slide as an EDF image of a scanner: with the focus, blur, softness of edges, noise, texture and staining
-    /// strength of [`Preset::ExtendedFocus`].
+    /// Returns the same slide as an EDF image of a scanner: with the focus, blur, softness of edges, noise, texture and
+    /// staining strength of [`Preset::ExtendedFocus`].
     #[must_use]
     pub fn fused(mut self) -> Self {
         let like = Preset::ExtendedFocus.recipe();

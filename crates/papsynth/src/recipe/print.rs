@@ -77,8 +77,8 @@ fn key(name: &str) -> String {
     line.strip_suffix(" = 0\n").unwrap_or(name).to_owned()
 }
 
-/// Returns whether a value of a recipe, as JSON, has its own `[table]` in TOML. Distributions and densities do not: they are
-/// written on one line.
+/// Returns whether a value of a recipe, as JSON, has its own `[table]` in TOML. Distributions and densities do not:
+/// they are written on one line.
 #[must_use]
 pub fn is_toml_table(value: &Value) -> bool {
     const INLINE: [&str; 5] = ["uniform", "normal", "log_normal", "choice", PER_MM2];

@@ -6,7 +6,8 @@ use super::section::section;
 section! {
     /// A whole slide, imaged frame by frame by a scanner (`papsynth slide`). Not used for fields.
     ///
-    /// Densities of cells and debris are those within the deposit. A count per field is divided by the mean area of a field.
+    /// Densities of cells and debris are those within the deposit. A count per field is divided by the mean area of a
+    /// field.
     pub struct Scan {
         /// Width of the image of the slide.
         width_px: u32 = 56_000, 64..=1000000, "pixels";
@@ -16,7 +17,8 @@ section! {
         frame_px: u32 = 2048, 128..=8192, "pixels";
         /// Fraction of the uneven illumination (`background.illumination`) that remains after the scanner's correction.
         residual_shading: f64 = 0.15, 0..=1;
-        /// Largest accepted distance from the centre of an object to the edge of its image. Larger objects are an error.
+        /// Largest accepted distance from the centre of an object to the edge of its image. Larger objects are an
+        /// error.
         max_object_radius_um: f64 = 400.0, 10..=2000, "µm";
         /// Deposit of the material.
         deposit: Deposit;
@@ -24,8 +26,8 @@ section! {
 }
 
 section! {
-    /// The round deposit of a liquid-based preparation. The default is a circle of 13 mm diameter, as made by filters and settling
-    /// chambers.
+    /// The round deposit of a liquid-based preparation. The default is a circle of 13 mm diameter, as made by filters
+    /// and settling chambers.
     pub struct Deposit, drawn as pub(crate) SceneDeposit {
         /// Centre of the deposit, from the left border of the image. All numbers of the deposit are drawn once a slide.
         x_um: Number = 7000.0, -1000000..=1000000, "µm";

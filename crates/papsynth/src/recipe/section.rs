@@ -1,8 +1,8 @@
 //! The declaration of sections: each number of a recipe is declared once, with documentation, default, range and unit.
 //!
-//! The declaration generates the struct with its documentation, `Default`, reading and writing, the bounds of the JSON schema,
-//! the checks of [`Recipe::problems`](super::Recipe::problems) and, for a section that is drawn number by number, the drawn struct
-//! and the names of the streams.
+//! The declaration generates the struct with its documentation, `Default`, reading and writing, the bounds of the JSON
+//! schema, the checks of [`Recipe::problems`](super::Recipe::problems) and, for a section that is drawn number by
+//! number, the drawn struct and the names of the streams.
 
 use std::borrow::Cow;
 
@@ -87,14 +87,15 @@ pub(crate) fn within(path: &str, field: &str) -> String {
 /// Declares a section of a recipe, or a choice of words or of sections.
 ///
 /// A field is `name: Kind = default, low..=high, "unit";`. `Kind` is [`Number`], [`Count`](super::Count),
-/// [`Abundance`](super::Abundance), a plain number, or the type of a word, a string or another section, which have no range. A
-/// section needs no default.
+/// [`Abundance`](super::Abundance), a plain number, or the type of a word, a string or another section, which have no
+/// range. A section needs no default.
 ///
-/// With `drawn as pub Name`, the struct `Name` has a drawn value of each field, and `draw` draws each from the stream with the
-/// dotted path of the field. With `drawn from rng as pub Name`, `one` draws all fields from one stream, in their order; dyes are
-/// zero there, and set by the caller. A field marked `(undrawn)` is omitted, a field marked `(last)` follows the others.
-/// `(Count as name: "Documentation.")` renames the drawn value; `Chance` in place of `Count` draws whether the event occurs. The
-/// caller sets fields marked `(given Type)` or `(given Type as name: "Documentation.")`, and fields listed after `also`.
+/// With `drawn as pub Name`, the struct `Name` has a drawn value of each field, and `draw` draws each from the stream
+/// with the dotted path of the field. With `drawn from rng as pub Name`, `one` draws all fields from one stream, in
+/// their order; dyes are zero there, and set by the caller. A field marked `(undrawn)` is omitted, a field marked
+/// `(last)` follows the others. `(Count as name: "Documentation.")` renames the drawn value; `Chance` in place of
+/// `Count` draws whether the event occurs. The caller sets fields marked `(given Type)` or `(given Type as name:
+/// "Documentation.")`, and fields listed after `also`.
 macro_rules! section {
     ($(#[$meta:meta])* pub struct $Name:ident $(, drawn $(from $source:ident)? as $visible:vis $Drawn:ident)? {
         $($(#[$about:meta])* $field:ident: $Kind:ident $(($($mark:tt)*))? $(= $default:expr $(, $low:literal..=$high:literal $(, $unit:literal)?)?)?;)*
@@ -256,8 +257,8 @@ macro_rules! section {
 }
 
 /// Returns the path of a number and the number: `named!(recipe.slide.depth_um)` has the path `slide.depth_um`, and
-/// `named!(self.count)` the path `count`. With the path of a section, as in `named!("layout", band.width_um)`, the path is
-/// `layout.width_um`.
+/// `named!(self.count)` the path `count`. With the path of a section, as in `named!("layout", band.width_um)`, the path
+/// is `layout.width_um`.
 macro_rules! named {
     ($section:literal, $owner:ident.$number:ident) => {
         (concat!($section, ".", stringify!($number)), &$owner.$number)

@@ -261,11 +261,13 @@ section! {
         wrinkle_um: Number (given f64) = Number::uniform(0.18, 0.5), 0.05..=5, "µm";
         /// Additional density and granularity of the cytoplasm around the nucleus, relative to the rest.
         endoplasm: Number (given f64) = Number::log_normal(0.08, 0.6), 0..=2;
-        /// Amplitude of the first level of detail, low-frequency Gaussian noise, relative to the absorbance of the cytoplasm.
+        /// Amplitude of the first level of detail, low-frequency Gaussian noise, relative to the absorbance of the
+        /// cytoplasm.
         clouds: Number = Number::uniform(0.10, 0.34), 0..=2;
         /// Standard deviation of the smoothing of that noise.
         clouds_um: Number = Number::uniform(3.0, 14.0), 0.1..=100, "µm";
-        /// Amplitude of the second level of detail, thresholded Brownian flecks, relative to the absorbance of the cytoplasm.
+        /// Amplitude of the second level of detail, thresholded Brownian flecks, relative to the absorbance of the
+        /// cytoplasm.
         flecks: Number = Number::log_normal(0.14, 0.5).at_least(0.0).at_most(0.5), 0..=5;
         /// Fraction of the cell without flecks.
         flecks_threshold: Number = Number::uniform(0.55, 0.85), 0..=0.999;
@@ -282,12 +284,13 @@ section! {
         fray_um: Number = Number::log_normal(0.65, 0.45), 0..=5, "µm";
         /// Width of the thinner rim of the sheet.
         rim_um: Number (given f64) = Number::log_normal(2.2, 0.36), 0..=10, "µm";
-        /// Gradient of the thickness of the sheet: standard deviation of the relative change over the radius of the cell.
+        /// Gradient of the thickness of the sheet: standard deviation of the relative change over the radius of the
+        /// cell.
         thickness_gradient: Number
             (given [f64; 2] as thickness_gradient: "Relative change of the thickness over a radius to the right and downwards.")
             = 0.18, 0..=1;
-        /// Phase delay of the flat sheet, in proportion to the thickness elsewhere. It gives bright and dark rims that swap when the
-        /// focus passes.
+        /// Phase delay of the flat sheet, in proportion to the thickness elsewhere. It gives bright and dark rims that
+        /// swap when the focus passes.
         phase_rad: Number (undrawn) = Number::uniform(0.05, 0.15), -3..=3, "radians of phase";
     }
 }
@@ -325,8 +328,8 @@ section! {
 section! {
     /// Restoration of nuclei whose donors are images (Eqs. 15, 16).
     pub enum Restore {
-        /// The transmitted light is restored before detection. The nuclei are not blurred twice, and have the noise of their donors
-        /// and of the camera.
+        /// The transmitted light is restored before detection. The nuclei are not blurred twice, and have the noise of
+        /// their donors and of the camera.
         BeforeDetection,
         /// The paper's method: the image is restored after detection. The nuclei have the noise of their donors only.
         AfterDetection,

@@ -56,7 +56,8 @@ impl Recipe {
         found
     }
 
-    /// Returns the size of a pixel in the object, µm: that of `field`, or that of the camera divided by the magnification.
+    /// Returns the size of a pixel in the object, µm: that of `field`, or that of the camera divided by the
+    /// magnification.
     fn pixel_um(&self, of: impl Fn(&Number) -> f64) -> f64 {
         let magnification = of(&self.field.magnification);
         if magnification <= 0.0 {
@@ -119,8 +120,8 @@ impl Recipe {
         );
     }
 
-    /// Returns the JSON schema of recipes. The bounds of a number apply to a plain value, and to a distribution after its `min`
-    /// and `max`.
+    /// Returns the JSON schema of recipes. The bounds of a number apply to a plain value, and to a distribution after
+    /// its `min` and `max`.
     #[must_use]
     pub fn schema() -> serde_json::Value {
         schemars::schema_for!(Self).to_value()

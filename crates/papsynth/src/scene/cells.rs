@@ -93,7 +93,8 @@ pub(super) fn draw_cells(
     Ok(Cells { objects, field: weights.field, region: weights.region, counts })
 }
 
-/// Returns how many cells of each class to place: those requested, or the same fraction of each class where they do not fit.
+/// Returns how many cells of each class to place: those requested, or the same fraction of each class where they do not
+/// fit.
 fn fitting(recipe: &Recipe, places: &Places, requested: &[usize], crowding: Crowding) -> Result<Vec<usize>, Cause> {
     /// Fraction of the cells that fit which is placed in a crowded field, so that each class gets places.
     const CROWDED: f64 = 0.9;

@@ -144,7 +144,8 @@ fn range(path: &str, name: &str) -> Option<&'static (&'static str, f64, f64)> {
     })
 }
 
-/// Compares every number with the range of its field, and says where a text or a truth value stands in place of a number.
+/// Compares every number with the range of its field, and says where a text or a truth value stands in place of a
+/// number.
 fn numbers(value: &Value, path: &str, name: &str) -> Result<(), Cause> {
     match value {
         Value::Object(fields) => fields.iter().try_for_each(|(name, value)| {
@@ -223,7 +224,11 @@ mod tests {
             (at("body/tint"), "green".into(), "unknown variant `green`"),
             (at("body/kind"), "dragon".into(), "unknown variant `dragon`"),
             (at("body/dyes"), Value::from(vec![1.0]), "invalid length 1"),
-            (at("body/detail/notches"), 1e9.into(), "body.detail.notches: 1000000000 is out of range: expected 0 to 100"),
+            (
+                at("body/detail/notches"),
+                1e9.into(),
+                "body.detail.notches: 1000000000 is out of range: expected 0 to 100",
+            ),
             (at("id"), 0.into(), "id: 0 is out of range: expected 1"),
         ] {
             let message = refused(&pointer, to);

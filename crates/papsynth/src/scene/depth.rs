@@ -12,8 +12,8 @@ pub(crate) struct Relief {
 }
 
 impl Relief {
-    /// Returns a relief with a range of `depth_um` over a field of `size_um`: Perlin noise with cells of `relief_um`, after a median
-    /// filter of `median_um`.
+    /// Returns a relief with a range of `depth_um` over a field of `size_um`: Perlin noise with cells of `relief_um`,
+    /// after a median filter of `median_um`.
     pub(crate) fn new(size_um: [f64; 2], depth_um: f64, relief_um: f64, median_um: f64, key: u64) -> Self {
         /// Samples per cell of the noise, for linear interpolation.
         const SAMPLES: f64 = 8.0;

@@ -23,8 +23,8 @@ pub const MAX_ATTEMPTS: u32 = 8;
 
 /// Draws the objects of a field and how it is imaged.
 ///
-/// `weight_map` is the image at the `path` of the layout, if it has one. If the cells do not fit, the objects are drawn again, up to
-/// [`MAX_ATTEMPTS`] times; the last time as many cells are placed as fit.
+/// `weight_map` is the image at the `path` of the layout, if it has one. If the cells do not fit, the objects are drawn
+/// again, up to [`MAX_ATTEMPTS`] times; the last time as many cells are placed as fit.
 ///
 /// # Errors
 /// If no draw can succeed: the weight map is missing or too uneven, or there are more objects than labels can number.
@@ -73,8 +73,8 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
     Ok(Scene { objects, slide, attempts: attempt + 1, cells: counts, ..empty(recipe, view, &field, &stain) })
 }
 
-/// Draws the coats of the clue cells, and adds the debris, in the field or in the field with its margin. `sieve` selects the objects
-/// of a part of a slide.
+/// Draws the coats of the clue cells, and adds the debris, in the field or in the field with its margin. `plot_density`
+/// selects the objects of a part of a slide.
 pub(super) fn strew(
     debris: &Debris,
     [field, region]: [Region; 2],

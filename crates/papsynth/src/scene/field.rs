@@ -20,7 +20,8 @@ pub struct Scene {
     pub slide: u64,
     /// The image and its pixels.
     pub view: View,
-    /// Position of the stage at each focal plane, µm, in the order of the stack. Larger values focus nearer to the objective.
+    /// Position of the stage at each focal plane, µm, in the order of the stack. Larger values focus nearer to the
+    /// objective.
     pub planes_um: Vec<f64>,
     /// The planes that are fused to an EDF image, if it is one: `planes_um` then has their centre.
     pub fusion: Option<Fusion>,
@@ -51,7 +52,8 @@ pub struct Scene {
 
 /// Number of cells of a class in a field.
 ///
-/// Cells whose `count` is a density also have centres in a margin of 60 µm around the field, so that they reach into the image.
+/// Cells whose `count` is a density also have centres in a margin of 60 µm around the field, so that they reach into
+/// the image.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClassCount {
@@ -140,14 +142,15 @@ impl Scene {
 
     /// Returns the grid of cytoplasm: that of the image if it is fine enough for wrinkles, otherwise that of the slide.
     pub(crate) fn sheet_grid(&self) -> View {
-        /// The maximum of a sampled Gaussian varies by 2·exp(−2π²σ²/p²) with its position, for samples at distance p: by nothing at
-        /// σ = .34 µm, the centre of the default; at σ = .11 µm, its minimum, by 5 % for p = .25 µm and by 25 % for p = .33 µm.
+        /// The maximum of a sampled Gaussian varies by 2·exp(−2π²σ²/p²) with its position, for samples at distance p:
+        /// by nothing at σ = .34 µm, the centre of the default; at σ = .11 µm, its minimum, by 5 % for p = .25 µm and
+        /// by 25 % for p = .33 µm.
         const COARSEST_UM: f64 = 0.35;
         if self.view.pixel_um <= COARSEST_UM { self.view } else { self.grid() }
     }
 
-    /// Returns the depth in focus at a position of the stage, µm. Because of refraction at the cover glass, it is 1.5 times the
-    /// position with a dry lens.
+    /// Returns the depth in focus at a position of the stage, µm. Because of refraction at the cover glass, it is 1.5
+    /// times the position with a dry lens.
     #[must_use]
     pub fn in_focus_um(&self, plane_um: f64) -> f64 {
         match &self.optics {
@@ -156,8 +159,8 @@ impl Scene {
         }
     }
 
-    /// Returns the position of the stage at which an object of a depth is imaged in a plane: that of the plane or, in an EDF image,
-    /// that of the sharpest plane of the object.
+    /// Returns the position of the stage at which an object of a depth is imaged in a plane: that of the plane or, in
+    /// an EDF image, that of the sharpest plane of the object.
     #[must_use]
     pub fn seen_at_um(&self, plane_um: f64, depth_um: f64) -> f64 {
         // Depth and position are proportional.

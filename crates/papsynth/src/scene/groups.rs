@@ -66,8 +66,8 @@ impl<'a> Groups<'a> {
         self.now.as_ref().is_none_or(|group| group.cells.len() >= group.size)
     }
 
-    /// Returns the place of the next cell. `free` returns the place of a cell that begins a group; a group is drawn from the stream of
-    /// its first cell.
+    /// Returns the place of the next cell. `free` returns the place of a cell that begins a group; a group is drawn
+    /// from the stream of its first cell.
     pub(super) fn next<E>(
         &mut self,
         radius_um: f64,

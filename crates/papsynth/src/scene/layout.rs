@@ -28,7 +28,8 @@ const JAMMED: f64 = 0.547;
 
 /// Weights of the places of a field, and of a margin around it.
 ///
-/// Objects of a density also have centres in the margin, so that the coverage at the border of the image is that of its centre.
+/// Objects of a density also have centres in the margin, so that the coverage at the border of the image is that of its
+/// centre.
 pub(super) struct Weights {
     /// The field.
     pub(super) field: Region,
@@ -146,7 +147,8 @@ fn cropped(map: &WeightMap, first: [usize; 2], size: [usize; 2]) -> WeightMap {
     WeightMap { width: size[0], weights }
 }
 
-/// Returns the squared distance of the centre of each pixel to the nearest cluster, in radii of the cluster; infinite far from all.
+/// Returns the squared distance of the centre of each pixel to the nearest cluster, in radii of the cluster; infinite
+/// far from all.
 ///
 /// Each cluster changes only the pixels around it, so that the time is proportional to the area.
 fn nearest_of(clusters: &[[f64; 3]], [width, height]: [usize; 2], size_um: [f64; 2]) -> Vec<f64> {

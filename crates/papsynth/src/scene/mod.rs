@@ -1,7 +1,7 @@
 //! The scene: a list of all objects of a field, drawn before any image is computed.
 //!
-//! A scene is drawn from a recipe, and an image is computed from a scene. Scenes are written as JSON ([`Scene::to_json`]) and
-//! read back ([`Scene::from_json`]), so that they can be edited or made by another program.
+//! A scene is drawn from a recipe, and an image is computed from a scene. Scenes are written as JSON
+//! ([`Scene::to_json`]) and read back ([`Scene::from_json`]), so that they can be edited or made by another program.
 
 pub(crate) mod cell;
 mod cells;

@@ -1,8 +1,8 @@
 //! The objects of a whole slide, square by square.
 //!
-//! A slide is divided into plots. The objects of a plot depend only on the key of the slide and the number of the plot: the number
-//! of tries, the place of each try, and whether it is accepted, by the density at its place, which is a function of the place.
-//! Any part of a slide can be drawn alone, and a slide is a part of each larger slide.
+//! A slide is divided into plots. The objects of a plot depend only on the key of the slide and the number of the plot:
+//! the number of tries, the place of each try, and whether it is accepted, by the density at its place, which is a
+//! function of the place. Any part of a slide can be drawn alone, and a slide is a part of each larger slide.
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
@@ -273,7 +273,8 @@ impl Population {
         let stain = FieldStain::of_slide(&self.recipe.stain, &slide);
         let side_um = self.side_um();
         let mut objects = self.sown(at).as_ref().clone();
-        // Of two cells of neighbouring plots that are too near to each other, that of the plot with the larger number is removed.
+        // Of two cells of neighbouring plots that are too near to each other, that of the plot with the larger number
+        // is removed.
         let mut taken = Vec::new();
         for [x, y] in [[-1, -1], [0, -1], [1, -1], [-1, 0]] {
             let corner = [x, y].map(|step: i64| step as f64 * side_um);

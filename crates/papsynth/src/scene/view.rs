@@ -73,8 +73,8 @@ impl Region {
     }
 }
 
-/// Draws the numbers of a field, each from the stream with its path in the recipe: a change of one number does not change the
-/// others.
+/// Draws the numbers of a field, each from the stream with its path in the recipe: a change of one number does not
+/// change the others.
 pub(crate) struct FieldNumbers {
     pub(crate) key: Key,
 }

@@ -1,6 +1,6 @@
 //! Inputs and buffers of the optics, and the light of the empty slide.
 
-use perlin_bg::{Background, BackgroundParams, FractalParams, Illumination, BackgroundTexture};
+use perlin_bg::{Background, BackgroundParams, BackgroundTexture, FractalParams, Illumination};
 use rand_core::Rng;
 
 use crate::error::Cause;

@@ -146,7 +146,8 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
             for crease in &plan.creases {
                 sheet.fold(crease)?;
             }
-            let view = PixelGrid { origin: [absorbance.origin[0] as f64, absorbance.origin[1] as f64], pixel_size: 1.0 };
+            let view =
+                PixelGrid { origin: [absorbance.origin[0] as f64, absorbance.origin[1] as f64], pixel_size: 1.0 };
             sheet.thickness_into(&mut absorbance.values, coverage.width, &view, |radius| {
                 interpolate(profile, 1.0 - radius)
             });

@@ -1,5 +1,5 @@
-//! Reads the text of a recipe, and reports all its errors at once: the field, its value, its place, what is accepted, and a
-//! suggestion for misspelt names.
+//! Reads the text of a recipe, and reports all its errors at once: the field, its value, its place, what is accepted,
+//! and a suggestion for misspelt names.
 //!
 //! ```
 //! let errors = papsynth::recipe::diagnose::read("[field]\nwidht_px = 96\n").unwrap_err();

@@ -21,7 +21,8 @@ fn fold(word: &str) -> Vec<char> {
     word.chars().take(LONGEST).map(|c| if c == '-' { '_' } else { c.to_ascii_lowercase() }).collect()
 }
 
-/// Returns the number of changes, insertions, deletions and swaps of neighbours between two words (optimal string alignment).
+/// Returns the number of changes, insertions, deletions and swaps of neighbours between two words (optimal string
+/// alignment).
 fn distance(a: &[char], b: &[char]) -> usize {
     let mut before: Vec<usize> = Vec::new();
     let mut last: Vec<usize> = (0..=b.len()).collect();

@@ -189,7 +189,8 @@ impl Check<'_> {
         }
     }
 
-    /// Reads a distribution alone, because the error of a section with a `kind` would not have the place of the distribution.
+    /// Reads a distribution alone, because the error of a section with a `kind` would not have the place of the
+    /// distribution.
     fn distribution(&mut self, node: &Node<'_>, section: Section<'_>, path: &[String]) {
         #[derive(serde::Deserialize)]
         struct One<T> {
