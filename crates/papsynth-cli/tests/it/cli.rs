@@ -476,7 +476,8 @@ fn a_density_map_is_stored_and_part_of_the_recipe() {
         fs::write(bench.path("map.png"), bytes).unwrap();
     };
     map(0);
-    let command = format!("generate --out out --frames 1 {TINY} --set layout.kind=density-map --set layout.path=map.png");
+    let command =
+        format!("generate --out out --frames 1 {TINY} --set layout.kind=density-map --set layout.path=map.png");
     bench.good(&command);
     let made = bench.files("out");
     let kept = made.keys().find(|name| name.starts_with("layout-")).expect("the map is stored");
