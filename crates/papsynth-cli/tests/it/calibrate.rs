@@ -344,7 +344,11 @@ fn invalid_flats_are_rejected() {
     rejected(&bench, "--flat sizes --dark no-such --bits 12", &["no-such", "no such folder"]);
     rejected(&bench, "--flat no-such --dark darks --bits 12", &["no-such"]);
     frames("alike/1", &PAIR, 0.0);
-    rejected(&bench, "--flat alike --dark darks --bits 12", &["alike: the brightest level is", "at least 1 %"]);
+    rejected(
+        &bench,
+        "--flat alike --dark darks --bits 12",
+        &["alike: the brightest light level is", "1 % of full scale"],
+    );
     frames("odd", &["1.tif", "2.tif", "3.tif"], 4000.0);
     rejected(&bench, "--flat odd --dark darks --bits 12", &["3 files; expected an even number"]);
     frames("single/5ms", &["1.tif"], 4000.0);

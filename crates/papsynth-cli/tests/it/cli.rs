@@ -9,8 +9,8 @@ use crate::support::{Bench, TINY};
 
 /// Invalid recipes, each with a part of the expected message.
 const HOSTILE: [(&str, &str); 74] = [
-    ("", "holds no setting"),
-    ("\n\n# nothing but a comment\n", "holds no setting"),
+    ("", "the recipe is empty"),
+    ("\n\n# nothing but a comment\n", "the recipe is empty"),
     ("[field]\nwidth_px = nan", "field.width_px: NaN"),
     ("[field]\nwidth_px = +inf", "field.width_px"),
     ("[field]\nwidth_px = -inf", "field.width_px"),
@@ -374,7 +374,7 @@ fn inspect_lists_contents_and_damage() {
     let run = bench.run("inspect out --verify");
     assert_eq!(run.code, 2);
     assert!(
-        run.out.contains("damaged     shard 2") && run.err.contains("out: damaged: 1 shard"),
+        run.out.contains("damaged     images/000002.png") && run.err.contains("out: damaged: 1 shard"),
         "{}{}",
         run.out,
         run.err
@@ -476,7 +476,8 @@ fn a_density_map_is_stored_and_part_of_the_recipe() {
         fs::write(bench.path("map.png"), bytes).unwrap();
     };
     map(0);
-    let command = format!("generate --out out --frames 1 {TINY} --set layout.kind=map --set layout.path=map.png");
+    let command =
+        format!("generate --out out --frames 1 {TINY} --set layout.kind=density-map --set layout.path=map.png");
     bench.good(&command);
     let made = bench.files("out");
     let kept = made.keys().find(|name| name.starts_with("layout-")).expect("the map is stored");

@@ -164,17 +164,17 @@ fn invalid_input_of_a_judge_is_rejected_and_no_file_is_written() {
     bench.good(&format!("generate --out damaged --frames 2 {FIELD} {CELLS}"));
     fs::write(bench.path("damaged/images/000001.png"), "x").unwrap();
     for (words, wanted) in [
-        ("judge good empty --pixel-um 0.3", "empty: the folder has no PNG, JPEG or TIFF file"),
+        ("judge good empty --pixel-um 0.3", "empty: contains no PNG, JPEG or TIFF file"),
         ("judge good missing --pixel-um 0.3", "missing: there is no such folder"),
         ("judge good good", "neither folder records its pixel size"),
         ("judge few good --pixel-um 0.3", "few: 1 field; at least 2 are needed"),
         ("judge good flat --pixel-um 0.3", "is constant"),
-        ("judge sizes sizes --pixel-um 0.3", "the mask is 64 x 40, its image 64 x 48"),
+        ("judge sizes sizes --pixel-um 0.3", "the mask is 64 x 40 pixels, the image 64 x 48"),
         ("judge good broken --pixel-um 0.3", "b.png"),
         ("judge grades good --pixel-um 0.3 --group H", "grades: no field of group H"),
         ("judge good good --pixel-um 0.3 --group Z", "good: no field of group Z"),
-        ("judge points good --pixel-um 0.3", "2 of 2 points lie outside the image of 64 x 48 pixels"),
-        ("judge good damaged --pixel-um 0.3", "damaged: shard 1 is not whole"),
+        ("judge points good --pixel-um 0.3", "2 of 2 points are outside the image of 64 x 48 pixels"),
+        ("judge good damaged --pixel-um 0.3", "shard 1 is damaged"),
         ("judge good good --pixel-um 0.3 --nuclei masks", "--nuclei masks: "),
         ("judge good good --pixel-um 0", "expected 0.05 to 4 micrometres"),
     ] {
