@@ -79,8 +79,6 @@ pub(crate) fn scene(index: u64, planes: usize, bits: u32) -> Scene {
     Scene {
         key: Key { seed: SEED, index },
         slide: index / 16,
-        attempts: 1,
-        cells: Default::default(),
         fusion: None,
         view: View { width: WIDTH, height: HEIGHT, pixel_um: 0.25 },
         planes_um: (0..planes).map(|z| 0.8 * z as f64 - 0.8).collect(),
