@@ -5,8 +5,9 @@ use std::fmt::{Display, Formatter};
 use std::io::{self, IsTerminal, Write, stderr};
 use std::ops::Range;
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
+use std::time::Duration;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 
@@ -162,6 +163,27 @@ pub(crate) fn stop_flag() -> Result<&'static AtomicBool, ExitError> {
         Ok(()) => Ok(&STOP),
         Err(error) => Err(ExitError::input(format!("cannot handle Ctrl-C: {error}"))),
     }
+}
+
+/// Runs work that writes no files, and ends the program soon after a stop, even if the work does not notice it.
+#[cfg(feature = "judge")]
+pub(crate) fn until_stopped<T>(stop: &AtomicBool, work: impl FnOnce() -> T) -> T {
+    /// Time that the work has to end by itself.
+    const GRACE: Duration = Duration::from_millis(500);
+    let (end, ended) = mpsc::channel::<()>();
+    std::thread::scope(|scope| {
+        scope.spawn(move || {
+            while ended.recv_timeout(Duration::from_millis(50)) == Err(mpsc::RecvTimeoutError::Timeout) {
+                if stop.load(Ordering::SeqCst) && ended.recv_timeout(GRACE) == Err(mpsc::RecvTimeoutError::Timeout) {
+                    ExitError::interrupted(ErrorReport::new("stopped; no file was written")).print();
+                    std::process::exit(INTERRUPTED.into());
+                }
+            }
+        });
+        // Ends the watching thread on return, and after a panic.
+        let _end = end;
+        work()
+    })
 }
 
 /// Set by `--quiet`: notes are not printed.

@@ -56,11 +56,13 @@ pub(crate) fn run(args: &args::Judge) -> Result<(), ExitError> {
     let bar = Bar::start(args.quiet);
     let report = |progress: Progress| bar.update(progress.done as u64, progress.total as u64, progress.phase);
     let control = Control { stop, report: &report };
-    let result = pool(args.threads)?.install(|| {
+    let pool = pool(args.threads)?;
+    let compare = || {
         let real = measure(&real, &measurer, pixel_um, "measuring real fields", &control)?;
         let synthetic = measure(&synthetic, &measurer, pixel_um, "measuring synthetic fields", &control)?;
         judge.compare_with(&real, &synthetic, &control).map_err(|error| exit_error(&error, None))
-    });
+    };
+    let result = exit::until_stopped(stop, || pool.install(compare));
     bar.clear();
     let report = result?;
     let mut numbers = serde_json::to_string_pretty(&report).unwrap_or_default();

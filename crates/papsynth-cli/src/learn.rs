@@ -115,7 +115,7 @@ fn traced(folder: &Path, pixel_um: f64, limits: &Limits) -> Result<Vec<Vec<Point
     let smallest_px = MIN_CELL_UM2 / (pixel_um * pixel_um);
     let mut outlines = Vec::new();
     for path in image_files(folder)?.values() {
-        let refuse = |what: papsynth::Cause| ExitError::input(format!("{}: {what}", path.display()));
+        let refuse = |what: papsynth::ErrorKind| ExitError::input(format!("{}: {what}", path.display()));
         let labels = read_label_map(path, limits)?;
         let regions = components(&labels, limits).map_err(|problem| Error::Input { path: path.clone(), problem })?;
         for region in regions.iter().filter(|r| !r.at_border && r.mask.area() as f64 >= smallest_px) {

@@ -55,7 +55,8 @@ pub(crate) fn run(args: &args::Match) -> Result<(), ExitError> {
     let bar = Bar::start(args.quiet);
     let report = |progress: Progress| bar.update(progress.done as u64, progress.total as u64, progress.phase);
     let control = Control { stop, report: &report };
-    let fit = pool(args.threads)?.install(|| matching.run(&fields, &make, &control));
+    let pool = pool(args.threads)?;
+    let fit = exit::until_stopped(stop, || pool.install(|| matching.run(&fields, &make, &control)));
     bar.clear();
     let fit = fit.map_err(|error| exit_error(&error, &args.real))?;
 

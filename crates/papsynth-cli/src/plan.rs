@@ -81,6 +81,11 @@ fn table(args: &Plan, setup: &Setup, layout: &Layout, samples: &Samples) -> Stri
     let mut out = String::new();
     let mut row = |name: &str, value: String| out.push_str(&format!("{name:<14}{value}\n"));
     row("frames", format!("{} in {} ({layout})", args.frames, counted(shards, "shard", "shards")));
+    let recipe = setup.engine.recipe();
+    row("field", format!("{:.4} mm², with these mean numbers of objects:", recipe.field_mm2()));
+    for (key, mean) in recipe.expected_counts() {
+        row("", format!("{mean:8.1}  {key}"));
+    }
     let [ms, low, high] = [mean, (mean - half).max(0.0), mean + half].map(|seconds| 1e3 * seconds);
     row("time", format!("{ms:.0} ms per frame and thread, 95 % interval {low:.0} to {high:.0} ({count} frames)"));
     let [all, low, high] = [mean, mean - half, mean + half].map(hours);

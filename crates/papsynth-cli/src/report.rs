@@ -54,6 +54,8 @@ pub(crate) struct Progress<'a> {
     style: Style,
     dir: &'a Path,
     bar: ProgressBar,
+    /// Number of written frames that lack cells for which there was no room.
+    crowded: AtomicU64,
 }
 
 impl<'a> Progress<'a> {
@@ -69,7 +71,7 @@ impl<'a> Progress<'a> {
                 "event": "start", "dir": dir, "seed": seed, "frames": frames, "threads": threads, "memory_bytes": memory,
             }))?;
         }
-        Ok(Self { style, dir, bar })
+        Ok(Self { style, dir, bar, crowded: AtomicU64::new(0) })
     }
 
     /// Counts a frame. Ignores broken pipes.
@@ -80,6 +82,16 @@ impl<'a> Progress<'a> {
             Step::Written(summary) => summary,
         };
         self.bar.inc(1);
+        if summary.unplaced() > 0 && self.crowded.fetch_add(1, Ordering::Relaxed) == 0 {
+            let requested: u64 = summary.cells.values().map(|count| count.requested).sum();
+            let text = format!(
+                "frame {}: {} of {requested} cells found no room in {} draws; the ground truth has the numbers",
+                summary.index,
+                summary.unplaced(),
+                summary.attempts
+            );
+            self.bar.suspend(|| exit::note(text));
+        }
         if self.style == Style::Bar && self.bar.position() == 1 {
             // There is no estimate before the first frame.
             self.bar.set_style(bar_style("{msg}", "frames, {elapsed} elapsed, about {eta} left"));
@@ -90,7 +102,7 @@ impl<'a> Progress<'a> {
                 let (done, total) = (self.bar.position(), self.bar.length().unwrap_or_default());
                 let eta_s = self.bar.eta().as_secs();
                 let _ = event(&json!({
-                    "event": "frame", "index": index, "objects": summary.objects, "done": done, "total": total, "eta_s": eta_s,
+                    "event": "frame", "index": index, "objects": summary.objects, "unplaced_cells": summary.unplaced(), "done": done, "total": total, "eta_s": eta_s,
                 }));
             }
             Style::Lines => {
@@ -108,9 +120,13 @@ impl<'a> Progress<'a> {
     /// Prints the result of a run of frames up to index `end`.
     pub(crate) fn done(&self, outcome: &Outcome, task: Task, end: u64) -> Result<(), ExitError> {
         let (dir, Outcome { written, present, .. }) = (self.dir, outcome);
+        let crowded = self.crowded.load(Ordering::Relaxed);
+        if crowded > 1 {
+            exit::note(format!("{crowded} frames lack cells for which there was no room"));
+        }
         match self.style {
             Style::Json => event(&json!({
-                "event": "done", "dir": dir, "written": written, "present": present, "peak_memory_bytes": memory::peak(),
+                "event": "done", "dir": dir, "written": written, "present": present, "crowded_frames": crowded, "peak_memory_bytes": memory::peak(),
             })),
             Style::Quiet => Ok(()),
             Style::Bar | Style::Lines => {

@@ -13,7 +13,7 @@ pub enum Error {
         /// The file.
         path: PathBuf,
         /// The defect.
-        problem: Problem,
+        problem: InputError,
     },
     /// An operation on a file failed.
     #[error("cannot {action} {}: {source}", path.display())]
@@ -62,7 +62,7 @@ impl Error {
         move |source| Self::Io { action, path: path.to_owned(), source }
     }
 
-    pub(crate) fn input(path: &Path) -> impl FnOnce(Problem) -> Self {
+    pub(crate) fn input(path: &Path) -> impl FnOnce(InputError) -> Self {
         move |problem| Self::Input { path: path.to_owned(), problem }
     }
 
@@ -79,7 +79,7 @@ impl Error {
 /// A defect of a file that was read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Problem {
+pub enum InputError {
     /// The "file" or "folder" does not exist.
     #[error("there is no such {0}")]
     Missing(&'static str),
@@ -163,7 +163,7 @@ pub enum Problem {
     },
 }
 
-impl Problem {
+impl InputError {
     pub(crate) fn broken(format: &'static str, message: impl ToString) -> Self {
         Self::Broken { format, message: message.to_string() }
     }
@@ -182,7 +182,7 @@ impl Problem {
     }
 }
 
-impl From<serde_json::Error> for Problem {
+impl From<serde_json::Error> for InputError {
     fn from(error: serde_json::Error) -> Self {
         Self::broken("JSON", error)
     }

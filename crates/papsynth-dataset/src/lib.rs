@@ -23,7 +23,7 @@ pub use dataset::{
     ShardRecord, ShardWriter, Summary, Task, VerifyProgress, VerifyReport, convert, field_files, image_paths, inspect,
     missing_shards, truth_difference, verify, verify_with_progress, write_png,
 };
-pub use error::{Error, Problem};
+pub use error::{Error, InputError};
 #[cfg(feature = "cloud")]
 pub use files::Bucket;
 pub use files::{Check, FileRecord, Location, Store, write_file};

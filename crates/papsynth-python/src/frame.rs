@@ -7,7 +7,7 @@ use numpy::{Element, IntoPyArray, PyArrayDyn, PyArrayMethods};
 use papsynth::Plane;
 use papsynth::scene::{ObjectKind, Tint};
 use papsynth::truth::{Bounds, Group, Mask, ObjectTruth, Part, Truth, UnknownTrait};
-use papsynth_dataset::{Column, Problem, columns, rle, write_png};
+use papsynth_dataset::{Column, InputError, columns, rle, write_png};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
@@ -396,7 +396,7 @@ fn restored_object(object: PickledObject, [width, height]: [usize; 2], planes: u
     ) = object;
     let unknown = |what: &str, name: &str| damaged(&format!("object {id}: unknown {what} `{name}`"));
     let mask = |counts: &str| {
-        rle::decode(counts, width, height).map_err(|error: Problem| damaged(&format!("object {id}: {error}")))
+        rle::decode(counts, width, height).map_err(|error: InputError| damaged(&format!("object {id}: {error}")))
     };
     if [defocus_um.len(), detectability.len()] != [planes; 2] {
         return Err(damaged(&format!("object {id}: expected {planes} values per plane list")));

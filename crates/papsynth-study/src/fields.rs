@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use papsynth_dataset::read::{image_files, natural_order};
-use papsynth_dataset::{Dataset, FrameSummary, Problem, ShardRecord};
+use papsynth_dataset::{Dataset, FrameSummary, InputError, ShardRecord};
 
 use crate::error::Error;
 
@@ -88,7 +88,7 @@ impl Root {
     fn add_images(&self, fields: &mut Vec<Field>) -> Result<(), Error> {
         let images = self.real.join("images");
         let (files, prefix) = match image_files(&self.real) {
-            Err(papsynth_dataset::Error::Input { problem: Problem::NoImages, .. }) if images.is_dir() => {
+            Err(papsynth_dataset::Error::Input { problem: InputError::NoImages, .. }) if images.is_dir() => {
                 (image_files(&self.inside(&images)?)?, "images/")
             }
             files => (files?, ""),
@@ -163,7 +163,7 @@ pub(crate) fn bytes(path: &Path, limit: u64) -> Result<Vec<u8>, Error> {
     });
     let read = read.map_err(failed)? as u64;
     if read > limit {
-        let problem = Problem::FileSize { bytes: read, limit };
+        let problem = InputError::FileSize { bytes: read, limit };
         return Err(papsynth_dataset::Error::Input { path: path.to_owned(), problem }.into());
     }
     Ok(bytes)

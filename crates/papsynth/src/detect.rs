@@ -4,7 +4,7 @@ use ccd_noise::{Blooming, Camera, CameraParams, Jpeg, JpegParams, ReadNoise, Sat
 use dye_spectra::{Colour, ColourParams, Lamp};
 use multiversion::multiversion;
 
-use crate::error::Cause;
+use crate::error::ErrorKind;
 use crate::recipe::{Binning, Mixing, PhotonNoise, Rendition, Subsampling};
 use crate::scene::{Scene, SceneCamera, SceneLight};
 use crate::truth::{Mask, Run};
@@ -78,7 +78,7 @@ impl ExposureBuffers {
 }
 
 /// The conversion of dye amounts to colours under a lamp.
-pub(crate) fn colour(lamp_k: f64, mixing: Mixing) -> Result<Colour, Cause> {
+pub(crate) fn colour(lamp_k: f64, mixing: Mixing) -> Result<Colour, ErrorKind> {
     let params = ColourParams {
         lamp: Lamp::Halogen { temperature_k: lamp_k },
         mixing: match mixing {
@@ -91,7 +91,7 @@ pub(crate) fn colour(lamp_k: f64, mixing: Mixing) -> Result<Colour, Cause> {
 }
 
 impl Detector {
-    pub(crate) fn new(scene: &Scene) -> Result<Self, Cause> {
+    pub(crate) fn new(scene: &Scene) -> Result<Self, ErrorKind> {
         let camera = scene.camera;
         let params = JpegParams {
             quality: camera.jpeg_quality,
@@ -243,7 +243,7 @@ impl Detector {
 
 impl Channel {
     /// `relative_light` is the light of the channel relative to the brightest channel.
-    fn new(camera: &SceneCamera, bits: u32, relative_light: f64) -> Result<Self, Cause> {
+    fn new(camera: &SceneCamera, bits: u32, relative_light: f64) -> Result<Self, ErrorKind> {
         let largest = libm::exp2(f64::from(bits)) - 1.0;
         let offset_dn = camera.offset_dn * libm::exp2(f64::from(bits) - f64::from(camera.bits));
         let (range_dn, glare) = (largest - offset_dn, camera.glare_subtracted);

@@ -9,7 +9,7 @@ pub enum Error {
     Recipe(Vec<InvalidField>),
     /// The model is invalid.
     #[error("model: {0}")]
-    Model(#[source] Cause),
+    Model(#[source] ErrorKind),
     /// A class cannot be learned from the given images.
     #[error("class `{class}` cannot be learned: {cause}")]
     Learn {
@@ -17,14 +17,14 @@ pub enum Error {
         class: String,
         /// The cause.
         #[source]
-        cause: Cause,
+        cause: ErrorKind,
     },
     /// The density map or label image of the layout is missing or invalid.
     #[error("layout: {0}")]
-    Layout(#[source] Cause),
+    Layout(#[source] ErrorKind),
     /// A scene is invalid.
     #[error("scene: {0}")]
-    Scene(#[source] Cause),
+    Scene(#[source] ErrorKind),
     /// An image cannot be generated.
     #[error("image {index}: {cause}")]
     Image {
@@ -32,14 +32,14 @@ pub enum Error {
         index: u64,
         /// The cause.
         #[source]
-        cause: Cause,
+        cause: ErrorKind,
     },
 }
 
 /// The cause of an [`Error`], with the field or object, its value, and what is accepted.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum Cause {
+pub enum ErrorKind {
     /// A number is out of range.
     #[error("{field}: {value} is out of range: expected {low} to {high}")]
     OutOfRange {
@@ -117,7 +117,7 @@ pub enum Cause {
         class: String,
         /// The cause.
         #[source]
-        cause: Box<Cause>,
+        cause: Box<ErrorKind>,
     },
 
     /// The pixel size of images to learn from is out of range.
@@ -164,7 +164,7 @@ pub enum Cause {
         path: String,
         /// The cause.
         #[source]
-        cause: Box<Cause>,
+        cause: Box<ErrorKind>,
     },
     /// The number of pixels of a weight map, first, is not a multiple of its width.
     #[error("a weight map of {0} pixels cannot have rows of {1} pixels")]
@@ -298,7 +298,7 @@ pub enum Cause {
         id: serde_json::Value,
         /// The cause.
         #[source]
-        cause: Box<Cause>,
+        cause: Box<ErrorKind>,
     },
     /// Two objects of a scene have the same id.
     #[error("id: another object has the same id")]
@@ -341,18 +341,18 @@ pub enum Cause {
     Spectrum(#[from] spectral_field::Error),
 }
 
-impl From<optics_psf::Error> for Cause {
+impl From<optics_psf::Error> for ErrorKind {
     fn from(error: optics_psf::Error) -> Self {
         Self::Optics("optics", error)
     }
 }
 
 /// Checks that a number is finite and in a range.
-pub(crate) fn within(field: &str, value: f64, [low, high]: [f64; 2]) -> Result<(), Cause> {
+pub(crate) fn within(field: &str, value: f64, [low, high]: [f64; 2]) -> Result<(), ErrorKind> {
     if value.is_finite() && (low..=high).contains(&value) {
         return Ok(());
     }
-    Err(Cause::OutOfRange { field: field.to_owned(), value, low, high })
+    Err(ErrorKind::OutOfRange { field: field.to_owned(), value, low, high })
 }
 
 /// An invalid image of a nucleus to learn from.

@@ -29,7 +29,7 @@ mod words;
 use portable_numerics::random;
 
 pub use engine::{Engine, Inputs};
-pub use error::{Cause, Error, NucleusError};
+pub use error::{Error, ErrorKind, NucleusError};
 pub use frame::{Finished, Frame, Plane, white_level};
 pub use slide::Slide;
 pub use threads::Threads;

@@ -4,7 +4,7 @@ use optics_psf::{Border, Gaussian, Scratch};
 use rand_core::Rng;
 
 use crate::detect::{Detector, ExposureBuffers, sum_over};
-use crate::error::Cause;
+use crate::error::ErrorKind;
 use crate::frame::{Finished, Plane};
 use crate::fuse;
 use crate::phantom::tile::overlay;
@@ -47,7 +47,7 @@ impl Rendering {
         scene: Scene,
         threads: Threads,
         buffers: &mut FrameBuffers,
-    ) -> Result<Self, Cause> {
+    ) -> Result<Self, ErrorKind> {
         let timer = assets.timer.clone();
         let noise_fields = assets.noise_fields.fields(scene.key);
         let objects: Vec<&Object> = scene.objects.iter().collect();
@@ -87,7 +87,7 @@ impl Rendering {
     /// Images one plane. Call once for each plane, in order.
     ///
     /// Eq. 13: I_f = g_po(10^(I_b − I_p) ∗ G_σxy) + g_g, and Eq. 15 before or after it.
-    pub(crate) fn plane<'d>(&mut self, index: usize, buffers: &'d mut FrameBuffers) -> Result<&'d Plane, Cause> {
+    pub(crate) fn plane<'d>(&mut self, index: usize, buffers: &'d mut FrameBuffers) -> Result<&'d Plane, ErrorKind> {
         let FrameBuffers { light, plane, exposure, .. } = buffers;
         let stage_um = self.scene.planes_um[index];
         let focus = FocusAt::Stage(stage_um);
@@ -187,7 +187,7 @@ impl Rendering {
     }
 
     /// Returns the all-in-focus image and the ground truth.
-    pub(crate) fn finish(self, buffers: &mut FrameBuffers) -> Result<Finished, Cause> {
+    pub(crate) fn finish(self, buffers: &mut FrameBuffers) -> Result<Finished, ErrorKind> {
         let several = self.planes() > 1;
         let all_in_focus =
             if several { self.timer.time(Stage::Light, || self.all_in_focus(buffers))? } else { Vec::new() };
@@ -224,7 +224,7 @@ impl Rendering {
         })
     }
 
-    fn all_in_focus(&self, buffers: &mut FrameBuffers) -> Result<Vec<f32>, Cause> {
+    fn all_in_focus(&self, buffers: &mut FrameBuffers) -> Result<Vec<f32>, ErrorKind> {
         let FrameBuffers { light, exposure, .. } = buffers;
         self.path.transmit(self.specimen(), FocusAt::Everywhere, light)?;
         let (view, channels) = (self.scene.view, self.scene.channels());
@@ -354,7 +354,7 @@ impl Rendering {
 
 /// Returns C′ = C ∗ G_σ, where C is 1 on nuclei with imaged texture and 0 elsewhere (Eq. 16), so that these are not
 /// blurred twice. Returns `None` if there are no such nuclei or restoration is off.
-fn feathered(scene: &Scene, phantoms: &[Phantom]) -> Result<Option<Vec<f32>>, Cause> {
+fn feathered(scene: &Scene, phantoms: &[Phantom]) -> Result<Option<Vec<f32>>, ErrorKind> {
     let (View { width, height, pixel_um }, n) = (scene.view, scene.oversampling());
     let imaged = || phantoms.iter().flat_map(|phantom| &phantom.pieces).filter(|piece| piece.imaged);
     if scene.restoration.restore == Restore::Off || imaged().next().is_none() {

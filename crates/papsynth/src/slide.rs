@@ -9,7 +9,7 @@
 use std::sync::Arc;
 
 use crate::engine::Engine;
-use crate::error::{Cause, Error};
+use crate::error::{Error, ErrorKind};
 use crate::key::Key;
 use crate::recipe::{Imaging, InvalidField, Optics};
 use crate::render::Rendering;
@@ -194,13 +194,13 @@ impl<'a> Slide<'a> {
         self.reaching(low, high).map_err(|cause| self.fail(cause))
     }
 
-    fn fail(&self, cause: Cause) -> Error {
+    fn fail(&self, cause: ErrorKind) -> Error {
         Error::Image { index: self.number, cause }
     }
 
     /// Returns the objects that reach into the rectangle of the slide from `low` to `high`. Positions of plots are
     /// relative to `low`.
-    fn reaching(&self, low: [i64; 2], high: [i64; 2]) -> Result<Vec<Object>, Cause> {
+    fn reaching(&self, low: [i64; 2], high: [i64; 2]) -> Result<Vec<Object>, ErrorKind> {
         let pixel_um = self.pixel_um();
         let most_um = self.engine.recipe().scan.max_object_radius_um;
         let halo = (most_um / pixel_um).ceil() as i64;
@@ -219,7 +219,7 @@ impl<'a> Slide<'a> {
                     let reach_px = reach_px + spread_px as f64;
                     if reach_px > halo as f64 {
                         let (kind, reach_um) = (object.body.kind().name(), reach_px * pixel_um);
-                        return Err(Cause::TooFar { kind, reach_um, most_um });
+                        return Err(ErrorKind::TooFar { kind, reach_um, most_um });
                     }
                     let at_px = [0, 1].map(|axis| at[axis] * PLOT_PX - low[axis]);
                     let meets = (0..2).all(|axis| {
@@ -243,7 +243,7 @@ impl<'a> Slide<'a> {
     pub fn frame(&self, at: [u32; 2], threads: Threads) -> Result<SlidePart, Error> {
         let frames = self.frames();
         if at[0] >= frames[0] || at[1] >= frames[1] {
-            return Err(self.fail(Cause::NoFrame(at, frames)));
+            return Err(self.fail(ErrorKind::NoFrame(at, frames)));
         }
         self.expose(at, [0, 0], self.size_px(), threads, true).map_err(|cause| self.fail(cause))
     }
@@ -256,7 +256,7 @@ impl<'a> Slide<'a> {
         size_px: [u32; 2],
         threads: Threads,
         noise_free: bool,
-    ) -> Result<SlidePart, Cause> {
+    ) -> Result<SlidePart, ErrorKind> {
         let (side, pixel_um, slide_px) = (self.side_px(), self.pixel_um(), self.size_px());
         let end_px = [0, 1].map(|axis| (origin_px[axis] + size_px[axis]).min((at[axis] * side).saturating_add(side)));
         let origin_px = [0, 1].map(|axis| origin_px[axis].max(at[axis] * side));
@@ -324,7 +324,7 @@ impl<'a> Slide<'a> {
             size_px[axis] > 0 && origin_px[axis].checked_add(size_px[axis]).is_some_and(|end| end <= slide_px[axis])
         });
         if !inside {
-            return Err(self.fail(Cause::OffSlide { origin_px, size_px, slide_px }));
+            return Err(self.fail(ErrorKind::OffSlide { origin_px, size_px, slide_px }));
         }
         let side = self.side_px();
         let frames = |axis: usize| origin_px[axis] / side..=(origin_px[axis] + size_px[axis] - 1) / side;

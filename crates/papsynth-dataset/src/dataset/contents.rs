@@ -15,7 +15,7 @@ use serde::Serialize;
 use super::manifest::Manifest;
 use super::record::{ShardRecord, read_record, recorded_shards};
 use super::set::Dataset;
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 use crate::files::{Check, Folder, is_temporary, last_part};
 use crate::formats::{Field, Format, LIMITS, TarFile, Written, names, tar};
 use crate::read;
@@ -133,7 +133,7 @@ fn compare(dataset: &Dataset, record: &ShardRecord) -> Result<(), Error> {
     let Dataset { folder, layout, .. } = dataset;
     let (coco, csv) = (&folder.path(&names::coco(record.shard)), &folder.inside(&names::table(record.shard))?);
     let document = dataset.document(record.shard)?;
-    let check = |fits: bool, what: String| Problem::unless(fits, what).map_err(Error::input(coco));
+    let check = |fits: bool, what: String| InputError::unless(fits, what).map_err(Error::input(coco));
     let (images, frames) = (document.images.len(), record.frames.len());
     check(images == frames, format!("it lists {images} images; the record lists {frames} frames"))?;
     let is_ours = document.info == Info::default() && document.licenses.is_empty();
@@ -163,7 +163,7 @@ fn compare(dataset: &Dataset, record: &ShardRecord) -> Result<(), Error> {
     check(before == document.annotations.len() as u64, "it has annotations without an image".to_owned())?;
     tar.map_or(Ok(()), |mut tar| tar.end())?;
     let same = read::bytes(csv, LIMITS.max_file_bytes)? == rows;
-    Problem::unless(same, format!("differs from {}", names::coco(record.shard))).map_err(Error::input(csv))
+    InputError::unless(same, format!("differs from {}", names::coco(record.shard))).map_err(Error::input(csv))
 }
 
 /// Checks that the record lists the files that are checked by their hashes alone.
@@ -175,7 +175,7 @@ fn unparsed_files_are_listed(dataset: &Dataset, record: &ShardRecord) -> Result<
         expected.extend(record.frames.iter().map(|frame| names::huggingface_file(split(frame), record.shard)));
     }
     match expected.iter().find(|name| record.files.iter().all(|file| file.path != **name)) {
-        Some(name) => Err(Error::input(&dataset.folder.path(name))(Problem::Missing("file"))),
+        Some(name) => Err(Error::input(&dataset.folder.path(name))(InputError::Missing("file"))),
         None => Ok(()),
     }
 }
@@ -183,11 +183,11 @@ fn unparsed_files_are_listed(dataset: &Dataset, record: &ShardRecord) -> Result<
 /// Checks that the scene file of a frame is valid and belongs to the frame.
 fn scene(folder: &Folder, frame: &FrameSummary, seed: u64) -> Result<(), Error> {
     let path = folder.inside(&names::scene(frame.index))?;
-    let broken = |message: String| Error::input(&path)(Problem::Broken { format: "JSON", message });
+    let broken = |message: String| Error::input(&path)(InputError::Broken { format: "JSON", message });
     let text = String::from_utf8(read::bytes(&path, LIMITS.max_file_bytes)?).map_err(|e| broken(e.to_string()))?;
     let scene = Scene::from_json(&text).map_err(|e| broken(e.to_string()))?;
     let same = scene.key.seed == seed && frame.is_of(&scene);
-    Problem::unless(same, format!("the scene of another frame, not {}", frame.index)).map_err(Error::input(&path))
+    InputError::unless(same, format!("the scene of another frame, not {}", frame.index)).map_err(Error::input(&path))
 }
 
 /// Builds the COCO document of a frame from its masks, and checks the visible masks and the summary in the record.
@@ -200,7 +200,7 @@ fn own_document(
 ) -> Result<Document, Error> {
     let ShardRecord { identity, layout, shard, .. } = record;
     let index = frame.index;
-    let check = |fits: bool, what: String| Problem::unless(fits, what).map_err(Error::input(coco));
+    let check = |fits: bool, what: String| InputError::unless(fits, what).map_err(Error::input(coco));
     let same = [truth.width, truth.height] == [frame.width, frame.height];
     check(same, format!("image {index}: the size differs from the record"))?;
     for group in Group::ALL {
@@ -219,7 +219,7 @@ fn own_document(
     check(counted == *frame, format!("image {index}: the summary in the record differs"))?;
     let files = layout.images_of(identity.seed, *shard, frame);
     let own = Document::of_frame(truth, frame, &saturated, &document.categories, files)
-        .map_err(|category| Error::input(coco)(Problem::unfit(format!("the category `{category}` is missing"))))?;
+        .map_err(|category| Error::input(coco)(InputError::unfit(format!("the category `{category}` is missing"))))?;
     let same = own.images.first() == document.image(index);
     check(same, format!("image {index}: file name or size differ from the record")).map(|()| own)
 }

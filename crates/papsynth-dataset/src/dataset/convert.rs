@@ -9,7 +9,7 @@ use super::generate::{Outcome, Progress};
 use super::images::{images, pages};
 use super::record::ShardRecord;
 use super::set::{Dataset, INPUT_BYTES};
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 use crate::files::Check;
 use crate::formats::{Depth, Format, LIMITS, Layout, TRAINING_BITS, levels, names, to_camera};
 use crate::read::{self, LevelImage};
@@ -150,7 +150,7 @@ impl<'a> OpenShard<'a> {
             let grey = levels(page, frame.channels);
             let noise_free = match &mut noise_free {
                 Some((path, pages)) => {
-                    pages.next().ok_or_else(|| Error::input(path)(Problem::unfit("has too few planes")))?
+                    pages.next().ok_or_else(|| Error::input(path)(InputError::unfit("has too few planes")))?
                 }
                 None => vec![0.0; frame.values()],
             };
@@ -169,7 +169,7 @@ impl<'a> OpenShard<'a> {
         let read = pages(source, &name, frame, record.shard, &mut |page| {
             convert_page(page).map_err(|error| {
                 failure = Some(error);
-                Problem::unfit("")
+                InputError::unfit("")
             })
         });
         failure.map_or(read, Err)

@@ -9,7 +9,7 @@ use papsynth::white_level as white;
 
 use super::record::{read_record, recorded_shards};
 use super::set::Dataset;
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 use crate::files::Check;
 #[cfg(feature = "zarr")]
 use crate::formats::read_planes;
@@ -53,7 +53,7 @@ impl Dataset {
         frames.into_iter().find(|frame| frame.index == location.index).ok_or_else(|| {
             let message = format!("contains no frame {}", location.index);
             let path = self.folder.path(&names::record(location.shard));
-            Error::input(&path)(Problem::broken("JSON", message))
+            Error::input(&path)(InputError::broken("JSON", message))
         })
     }
 
@@ -90,7 +90,7 @@ impl Dataset {
             number += 1;
             Ok(())
         })?;
-        let complete = Problem::unless(number == expected, format!("planes: found {number}, expected {expected}"));
+        let complete = InputError::unless(number == expected, format!("planes: found {number}, expected {expected}"));
         complete.map_err(Error::input(&self.folder.path(&name)))
     }
 
@@ -119,7 +119,7 @@ pub(super) fn display_image(dataset: &Dataset, frame: &FrameSummary, shard: u64)
         number += 1;
         Ok(())
     })?;
-    central.ok_or_else(|| Error::input(&path)(Problem::NoImages))
+    central.ok_or_else(|| Error::input(&path)(InputError::NoImages))
 }
 
 /// Calls `take` with each page of an image of a frame.
@@ -171,7 +171,7 @@ fn check_hash(dataset: &Dataset, file: &str, shard: u64) -> Result<(), Error> {
         None => Some("no record lists this file".to_owned()),
     };
     match defect {
-        Some(defect) => Err(Error::input(&dataset.folder.path(file))(Problem::unfit(defect))),
+        Some(defect) => Err(Error::input(&dataset.folder.path(file))(InputError::unfit(defect))),
         None => {
             trusted.insert(file.to_owned());
             Ok(())
@@ -180,11 +180,11 @@ fn check_hash(dataset: &Dataset, file: &str, shard: u64) -> Result<(), Error> {
 }
 
 /// Returns the grey levels of a page after a check of its size.
-fn checked_levels(page: LevelImage, frame: &FrameSummary) -> Result<Vec<u16>, Problem> {
+fn checked_levels(page: LevelImage, frame: &FrameSummary) -> Result<Vec<u16>, InputError> {
     let FrameSummary { width, height, channels, .. } = *frame;
     let found = [page.width, page.height(), page.channels];
     if found[..2] != [width, height] || found[2] > channels {
-        return Err(Problem::unfit(format!(
+        return Err(InputError::unfit(format!(
             "image size: found {} x {} px with {} channel(s), expected {width} x {height} px with {channels} channel(s)",
             found[0], found[1], found[2]
         )));

@@ -9,7 +9,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::record::{FORMAT, Identity, check_paths, check_version};
 use crate::bytes::{json, sha256};
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 use crate::files::{FileRecord, Folder};
 use crate::formats::{Layout, names};
 use crate::truth::Category;
@@ -101,7 +101,7 @@ impl Manifest {
     ///
     /// # Errors
     /// If it is invalid or of another version.
-    pub fn from_json(bytes: &[u8]) -> Result<Self, Problem> {
+    pub fn from_json(bytes: &[u8]) -> Result<Self, InputError> {
         Self::from_reader(&mut &*bytes)
     }
 
@@ -116,11 +116,11 @@ impl Manifest {
         Self::from_reader(&mut BufReader::new(file)).map_err(Error::input(&path))
     }
 
-    fn from_reader(reader: &mut dyn Read) -> Result<Self, Problem> {
+    fn from_reader(reader: &mut dyn Read) -> Result<Self, InputError> {
         let file: ManifestFile = serde_json::from_reader(reader)?;
         if file.format != FORMAT {
             let message = format!("format: expected `{FORMAT}`, found `{}`", file.format.escape_default());
-            return Err(Problem::broken("JSON", message));
+            return Err(InputError::broken("JSON", message));
         }
         check_version(file.version)?;
         check_paths(&file.files)?;
@@ -130,7 +130,7 @@ impl Manifest {
             file.sealed();
         match head_sha256 == expected {
             true => Ok(Self { writer, identity, layout, categories, frames, shards, files }),
-            false => Err(Problem::broken("JSON", "was changed: the SHA-256 of its head differs")),
+            false => Err(InputError::broken("JSON", "was changed: the SHA-256 of its head differs")),
         }
     }
 }

@@ -9,7 +9,7 @@ use papsynth::recipe::Recipe;
 use serde::{Deserialize, Serialize};
 
 use crate::bytes::{self, sha256};
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 use crate::files::{FileRecord, Folder};
 use crate::formats::{Layout, names};
 use crate::read;
@@ -94,7 +94,7 @@ impl ShardRecord {
     ///
     /// # Errors
     /// If it is invalid, of another version, was changed after it was written, or lists a file outside the data set.
-    pub fn from_json(bytes: &[u8]) -> Result<Self, Problem> {
+    pub fn from_json(bytes: &[u8]) -> Result<Self, InputError> {
         let record: Self = serde_json::from_slice(bytes)?;
         check_version(record.version)?;
         check_paths(&record.files)?;
@@ -116,7 +116,7 @@ impl ShardRecord {
 
     /// Checks that the frames belong to the shard, are sorted, and have valid sizes, because readers allocate by these
     /// numbers.
-    fn check_frames(&self) -> Result<(), Problem> {
+    fn check_frames(&self) -> Result<(), InputError> {
         let each = self.layout.frames_per_shard;
         let range = self.shard.saturating_mul(each)..self.shard.saturating_add(1).saturating_mul(each);
         let mut previous = None;
@@ -159,7 +159,7 @@ impl ShardRecord {
 /// Reads the record of a shard.
 ///
 /// # Errors
-/// If it is invalid, or missing: [`Problem::Missing`].
+/// If it is invalid, or missing: [`InputError::Missing`].
 pub(crate) fn read_record(folder: &Folder, shard: u64) -> Result<ShardRecord, Error> {
     let path = folder.inside(&names::record(shard))?;
     let record = ShardRecord::from_json(&read::bytes(&path, RECORD_BYTES)?).map_err(Error::input(&path))?;
@@ -188,7 +188,7 @@ pub(crate) fn is_inside(path: &str) -> bool {
 }
 
 /// Checks that all files are inside the data set.
-pub(super) fn check_paths(files: &[FileRecord]) -> Result<(), Problem> {
+pub(super) fn check_paths(files: &[FileRecord]) -> Result<(), InputError> {
     match files.iter().find(|file| !is_inside(&file.path)) {
         Some(file) => Err(json(format!("lists the file `{}` outside the data set", file.path.escape_default()))),
         None => Ok(()),
@@ -196,13 +196,13 @@ pub(super) fn check_paths(files: &[FileRecord]) -> Result<(), Problem> {
 }
 
 /// Checks the version of the format.
-pub(super) fn check_version(found: u32) -> Result<(), Problem> {
+pub(super) fn check_version(found: u32) -> Result<(), InputError> {
     if found == FORMAT_VERSION {
         return Ok(());
     }
     Err(json(format!("version: expected {FORMAT_VERSION}, found {found}")))
 }
 
-fn json(message: String) -> Problem {
-    Problem::broken("JSON", message)
+fn json(message: String) -> InputError {
+    InputError::broken("JSON", message)
 }

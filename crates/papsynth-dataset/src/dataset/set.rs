@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::manifest::Manifest;
 use super::record::{Identity, recorded_shards};
 use crate::bytes::sha256;
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 use crate::files::{FileRecord, Folder, Location};
 use crate::formats::{Layout, names};
 use crate::read;
@@ -147,7 +147,7 @@ impl Dataset {
                 )
             };
             if found != *expected {
-                return Err(self.folder.named(Error::input(&path)(Problem::unfit(message()))));
+                return Err(self.folder.named(Error::input(&path)(InputError::unfit(message()))));
             }
         }
         Ok(())

@@ -10,7 +10,7 @@ use super::fault;
 use super::pending::{FileRecord, Output, Pending, is_desktop_file, is_temporary};
 use super::store::{Location, Remote};
 use crate::bytes::measure;
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 
 /// The extent of a check of files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -156,7 +156,7 @@ impl Folder {
         for part in name.split('/') {
             path.push(part);
             match fs::symlink_metadata(&path) {
-                Ok(found) if found.is_symlink() => return Err(Error::input(&path)(Problem::Link)),
+                Ok(found) if found.is_symlink() => return Err(Error::input(&path)(InputError::Link)),
                 Ok(_) => {}
                 Err(_) => break,
             }

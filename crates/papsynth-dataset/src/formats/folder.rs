@@ -8,7 +8,7 @@ use super::names;
 use super::ome::{Levels, description, label_tiff, page};
 use super::sink::{Field, Files, Sink};
 use super::written::{LIMITS, Written, is_described};
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 use crate::read;
 use crate::truth::FrameSummary;
 use crate::write::{Page, Pages, Pixels, compressed};
@@ -36,9 +36,9 @@ pub(super) fn check(written: &Written) -> Result<(), Error> {
     written.file(&names::noise_free(index), |bytes| {
         let due = frame.planes_um.len();
         let pages = read::float_pages(bytes, &LIMITS, due)?;
-        Problem::unless(pages.len() == due, format!("{} planes; the record has {due}", pages.len()))?;
+        InputError::unless(pages.len() == due, format!("{} planes; the record has {due}", pages.len()))?;
         let fits = pages.iter().all(|page| page.len() == frame.values() && page.iter().all(|v| v.is_finite()));
-        Problem::unless(fits, "the size differs from the record, or some values are not finite")
+        InputError::unless(fits, "the size differs from the record, or some values are not finite")
     })?;
     for group in Group::ALL {
         let ids = truth.labels(group).ids;

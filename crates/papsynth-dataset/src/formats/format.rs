@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::depth::Depth;
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 use crate::truth::Flatten;
 
 /// Whether this build writes Parquet.
@@ -186,7 +186,7 @@ impl Layout {
     }
 
     /// Checks a layout that was read from a file.
-    pub(crate) fn check(&self) -> Result<(), Problem> {
+    pub(crate) fn check(&self) -> Result<(), InputError> {
         let message = match self.frames_per_shard {
             1..=MOST_FRAMES_PER_SHARD if self.formats.is_empty() => "the layout has no format".to_owned(),
             1..=MOST_FRAMES_PER_SHARD if !self.formats.is_sorted_by(|a, b| a < b) => {
@@ -195,7 +195,7 @@ impl Layout {
             1..=MOST_FRAMES_PER_SHARD => return Ok(()),
             frames => format!("frames_per_shard is {frames}; expected 1 to {MOST_FRAMES_PER_SHARD}"),
         };
-        Err(Problem::broken("JSON", message))
+        Err(InputError::broken("JSON", message))
     }
 
     /// Whether each shard has one frame.

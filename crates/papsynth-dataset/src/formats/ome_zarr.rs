@@ -17,7 +17,7 @@ use super::depth::Depth;
 use super::names::{numbered, zarr_group as group_of};
 use super::sink::{Field, Files, Sink};
 use super::written::{LIMITS, Take, Written, is_of_masks};
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 use crate::files::{Folder, Output};
 use crate::read::{self, LevelImage};
 use crate::truth::{FrameSummary, category_name, layers};
@@ -248,7 +248,7 @@ pub(super) fn check(written: &Written) -> Result<(), Error> {
     let layers = label_layers(field)?;
     for (name, expected) in documents(field.seed, frame, layers.iter().map(|layer| layer.labels.clone()).collect())? {
         written.file(&format!("{group}/{name}"), |bytes| {
-            Problem::unless(bytes == expected, "the content differs from the record and coco.json")
+            InputError::unless(bytes == expected, "the content differs from the record and coco.json")
         })?;
     }
     let pyramid = image_pyramid(frame)?;
@@ -270,7 +270,7 @@ fn are_halves(written: &Written, group: &str, pyramid: &Pyramid) -> Result<(), E
             let [channels, planes, _, width] = full.shape();
             for (plane, channel) in (0..planes).flat_map(|plane| (0..channels).map(move |channel| (plane, channel))) {
                 let expected = halved(&above.plane(channel, plane)?, width);
-                Problem::unless(
+                InputError::unless(
                     below.plane(channel, plane)? == expected,
                     "the level is not the previous level at half size",
                 )?;
@@ -298,12 +298,12 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    fn open(array: &papsynth_zarr::Array, bytes: &'a [u8]) -> Result<Self, Problem> {
+    fn open(array: &papsynth_zarr::Array, bytes: &'a [u8]) -> Result<Self, InputError> {
         let shard = ShardReader::open(array, Shard::default(), Cursor::new(bytes)).map_err(broken)?;
         Ok(Self { shard, kind: array.kind() })
     }
 
-    fn plane(&mut self, channel: usize, plane: usize) -> Result<Vec<u32>, Problem> {
+    fn plane(&mut self, channel: usize, plane: usize) -> Result<Vec<u32>, InputError> {
         let values = match self.kind {
             DataType::U8 => self.shard.plane::<u8>(channel, plane).map(|v| v.into_iter().map(u32::from).collect()),
             DataType::U16 => self.shard.plane::<u16>(channel, plane).map(|v| v.into_iter().map(u32::from).collect()),
@@ -313,13 +313,13 @@ impl<'a> Reader<'a> {
     }
 }
 
-fn broken(error: papsynth_zarr::Error) -> Problem {
-    Problem::broken("Zarr", error)
+fn broken(error: papsynth_zarr::Error) -> InputError {
+    InputError::broken("Zarr", error)
 }
 
 /// Reads the planes of a frame from the shard of its image at full size.
-fn planes(bytes: &[u8], frame: &FrameSummary, take: &mut Take) -> Result<(), Problem> {
-    let pyramid = image_pyramid(frame).map_err(|error| Problem::unfit(error.to_string()))?;
+fn planes(bytes: &[u8], frame: &FrameSummary, take: &mut Take) -> Result<(), InputError> {
+    let pyramid = image_pyramid(frame).map_err(|error| InputError::unfit(error.to_string()))?;
     let mut reader = Reader::open(&pyramid.levels()[0], bytes)?;
     let (width, channels) = (frame.width, frame.channels);
     for plane in 0..frame.planes_um.len() {

@@ -8,7 +8,7 @@ use super::ome::{image_description, ome_image};
 use super::sink::{Field, Files};
 use super::written::{Written, is_described};
 use crate::bytes;
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 use crate::truth;
 
 pub(super) fn image(index: u64) -> String {
@@ -43,7 +43,7 @@ pub(super) fn check(written: &Written) -> Result<(), Error> {
     })?;
     written.file(&objects(field.frame.index), |bytes| {
         let found: Value = serde_json::from_slice(bytes)?;
-        Problem::unless(found == collection(field), "the features differ from the masks in coco.json")
+        InputError::unless(found == collection(field), "the features differ from the masks in coco.json")
     })
 }
 

@@ -19,7 +19,7 @@ use super::ome::{Levels, description, label_tiff, page};
 use super::sink::{Field, Files, Sink};
 use super::written::{LIMITS, Written, is_described};
 use crate::bytes::json;
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 use crate::files::{Folder, Handle, Pending};
 use crate::truth::{FrameSummary, Split};
 use crate::write::{PageWriter, fits_16_bits, label_png};
@@ -97,7 +97,7 @@ impl TarFile {
     pub(crate) fn open(folder: &Folder, name: &str) -> Result<Self, Error> {
         let path = folder.inside(name)?;
         let file = File::open(&path).map_err(|e| match e.kind() {
-            ErrorKind::NotFound => Error::input(&path)(Problem::Missing("file")),
+            ErrorKind::NotFound => Error::input(&path)(InputError::Missing("file")),
             _ => Error::io("read", &path)(e),
         })?;
         Ok(Self { path, archive: tar::Archive::new(BufReader::new(file)) })
@@ -115,7 +115,7 @@ impl TarFile {
                 return files.bytes(entry);
             }
         }
-        Err(Error::input(files.path)(Problem::broken("tar", format!("the archive has no file `{name}`"))))
+        Err(Error::input(files.path)(InputError::broken("tar", format!("the archive has no file `{name}`"))))
     }
 }
 
@@ -148,7 +148,7 @@ impl<'a> Tar<'a> {
             None => Ok(()),
             Some((name, _)) => {
                 let what = format!("unexpected file `{}` after the last frame", name.escape_default());
-                Err(Error::input(self.path)(Problem::unfit(what)))
+                Err(Error::input(self.path)(InputError::unfit(what)))
             }
         }
     }
@@ -158,7 +158,7 @@ impl<'a> Tar<'a> {
 fn read_error(path: &Path) -> impl Fn(io::Error) -> Error {
     move |e| match e.kind() {
         io::ErrorKind::Other | io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {
-            Error::input(path)(Problem::broken("tar", e))
+            Error::input(path)(InputError::broken("tar", e))
         }
         _ => Error::io("read", path)(e),
     }
@@ -177,9 +177,9 @@ pub(super) fn check(written: &Written, tar: &mut Tar) -> Result<(), Error> {
                 written.labels(&bytes, &written.flat(group))
             }
             ("json", _) if ending == part => {
-                let found = serde_json::from_slice::<Value>(&bytes).map_err(Problem::from);
+                let found = serde_json::from_slice::<Value>(&bytes).map_err(InputError::from);
                 let same = found.map(|found| found == head(field));
-                same.and_then(|same| Problem::unless(same, "the content differs from the record and coco.json"))
+                same.and_then(|same| InputError::unless(same, "the content differs from the record and coco.json"))
             }
             ("ome.tif", _) if ending == part => written
                 .planes(&bytes, Depth::Training)
@@ -187,7 +187,7 @@ pub(super) fn check(written: &Written, tar: &mut Tar) -> Result<(), Error> {
             (_, None) if ending == part => written.image(&bytes, Depth::Training),
             _ => {
                 let what = format!("found `{}`; expected {key}.{part}", name.escape_default());
-                return Err(Error::input(tar.path)(Problem::unfit(what)));
+                return Err(Error::input(tar.path)(InputError::unfit(what)));
             }
         };
         checked.map_err(Error::input(&path))?;

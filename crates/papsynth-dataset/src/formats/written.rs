@@ -8,7 +8,7 @@ use super::depth::{Depth, TRAINING_BITS, to_training};
 use super::format::Layout;
 use super::sink::Field;
 use crate::bytes::sha256;
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 use crate::files::Folder;
 use crate::read::{self, LevelImage, Limits};
 
@@ -30,9 +30,9 @@ pub(crate) fn levels(page: LevelImage, channels: usize) -> Vec<u16> {
     }
 }
 
-pub(crate) type Take<'a> = dyn FnMut(LevelImage) -> Result<(), Problem> + 'a;
+pub(crate) type Take<'a> = dyn FnMut(LevelImage) -> Result<(), InputError> + 'a;
 
-type Read<'a> = dyn FnMut(&mut Take) -> Result<(), Problem> + 'a;
+type Read<'a> = dyn FnMut(&mut Take) -> Result<(), InputError> + 'a;
 
 /// A frame whose files are read back.
 pub(crate) struct Written<'a> {
@@ -56,28 +56,28 @@ impl<'a> Written<'a> {
         Self { folder, layout, field, planes: Seen::default(), image: Seen::default() }
     }
 
-    pub(super) fn file(&self, name: &str, check: impl FnOnce(&[u8]) -> Result<(), Problem>) -> Result<(), Error> {
+    pub(super) fn file(&self, name: &str, check: impl FnOnce(&[u8]) -> Result<(), InputError>) -> Result<(), Error> {
         let path = self.folder.inside(name)?;
         check(&read::bytes(&path, LIMITS.max_file_bytes)?).map_err(Error::input(&path))
     }
 
     /// Checks the planes of an image: number, size and bit depth as in the record, and the same levels in every format.
-    pub(super) fn planes(&self, bytes: &[u8], depth: Depth) -> Result<(), Problem> {
+    pub(super) fn planes(&self, bytes: &[u8], depth: Depth) -> Result<(), InputError> {
         self.read_planes(depth, &mut |take| LevelImage::pages(bytes, &LIMITS, take))
     }
 
     /// Checks the image of a frame in one plane: the same levels in every format.
-    pub(crate) fn image(&self, bytes: &[u8], depth: Depth) -> Result<(), Problem> {
+    pub(crate) fn image(&self, bytes: &[u8], depth: Depth) -> Result<(), InputError> {
         self.compare(1, depth, &self.image, &mut |take| LevelImage::pages(bytes, &LIMITS, take))
     }
 
     /// Checks the planes that `read` reads, as [`planes`](Self::planes) does.
-    pub(super) fn read_planes(&self, depth: Depth, read: &mut Read) -> Result<(), Problem> {
+    pub(super) fn read_planes(&self, depth: Depth, read: &mut Read) -> Result<(), InputError> {
         let frame = self.field.frame;
         self.compare(frame.planes_um.len(), depth, if frame.is_stack() { &self.planes } else { &self.image }, read)
     }
 
-    fn compare(&self, planes: usize, depth: Depth, seen: &Seen, read: &mut Read) -> Result<(), Problem> {
+    fn compare(&self, planes: usize, depth: Depth, seen: &Seen, read: &mut Read) -> Result<(), InputError> {
         let frame = self.field.frame;
         let is_deep = frame.bits > TRAINING_BITS;
         let is_camera = !is_deep || depth == Depth::Camera;
@@ -86,13 +86,13 @@ impl<'a> Written<'a> {
         let (mut camera, mut training) = (Vec::new(), Vec::new());
         read(&mut |page| {
             let same_size = [page.width, page.height()] == [frame.width, frame.height];
-            Problem::unless(same_size, "the image size differs from the record")?;
+            InputError::unless(same_size, "the image size differs from the record")?;
             let bits = if page.white > u16::from(u8::MAX) { 16 } else { 8 };
-            Problem::unless(bits == sample_bits, format!("the samples have {bits} bits; expected {sample_bits}"))?;
+            InputError::unless(bits == sample_bits, format!("the samples have {bits} bits; expected {sample_bits}"))?;
             let levels = levels(page, frame.channels);
-            Problem::unless(levels.len() == frame.values(), "the number of channels differs from the record")?;
+            InputError::unless(levels.len() == frame.values(), "the number of channels differs from the record")?;
             let more = format!("more than {planes} plane{}; the record has {planes}", plural(planes));
-            Problem::unless(camera.len().max(training.len()) < planes, more)?;
+            InputError::unless(camera.len().max(training.len()) < planes, more)?;
             if is_camera {
                 camera.push(hash(&levels));
             }
@@ -103,20 +103,20 @@ impl<'a> Written<'a> {
         })?;
         let count = camera.len().max(training.len());
         let few = format!("{count} plane{}; the record has {planes}", plural(count));
-        Problem::unless(count == planes, few)?;
+        InputError::unless(count == planes, few)?;
         for (seen, found) in [(&seen.camera, camera), (&seen.training, training)] {
             let same = found.is_empty() || *seen.get_or_init(|| found.clone()) == found;
-            Problem::unless(same, "the pixels differ from the image in another format")?;
+            InputError::unless(same, "the pixels differ from the image in another format")?;
         }
         Ok(())
     }
 
-    pub(super) fn labels(&self, bytes: &[u8], ids: &[u32]) -> Result<(), Problem> {
+    pub(super) fn labels(&self, bytes: &[u8], ids: &[u32]) -> Result<(), InputError> {
         let found = read::label_map(bytes, &LIMITS)?;
         is_of_masks(found.width == self.field.frame.width && found.ids == ids)
     }
 
-    pub(super) fn layers(&self, bytes: &[u8], layers: &[Vec<u32>]) -> Result<(), Problem> {
+    pub(super) fn layers(&self, bytes: &[u8], layers: &[Vec<u32>]) -> Result<(), InputError> {
         let found = read::label_pages(bytes, &LIMITS, layers.len().max(1))?;
         is_of_masks(found.iter().map(|page| &page.ids).eq(layers))
     }
@@ -128,14 +128,14 @@ impl<'a> Written<'a> {
 }
 
 /// Compares sizes, channels, units and depths in the OME-XML of a file with `expected`.
-pub(super) fn is_described(bytes: &[u8], expected: &str) -> Result<(), Problem> {
+pub(super) fn is_described(bytes: &[u8], expected: &str) -> Result<(), InputError> {
     let found = read::description(bytes)?.unwrap_or_default();
     let wrong =
         ["SizeX", "SizeY", "SizeZ", "SizeC", "SizeT", "Type", "PhysicalSizeX", "PhysicalSizeY", "PhysicalSizeZ"]
             .into_iter()
             .find(|name| values(&found, name).ne(values(expected, name)))
             .or_else(|| values(&found, "PositionZ").ne(values(expected, "PositionZ")).then_some("PositionZ"));
-    wrong.map_or(Ok(()), |name| Err(Problem::unfit(format!("{name} in the OME-XML differs from the record"))))
+    wrong.map_or(Ok(()), |name| Err(InputError::unfit(format!("{name} in the OME-XML differs from the record"))))
 }
 
 /// Returns all values of an attribute.
@@ -151,6 +151,6 @@ fn plural(count: usize) -> &'static str {
     if count == 1 { "" } else { "s" }
 }
 
-pub(super) fn is_of_masks(holds: bool) -> Result<(), Problem> {
-    Problem::unless(holds, "the labels differ from the masks in coco.json")
+pub(super) fn is_of_masks(holds: bool) -> Result<(), InputError> {
+    InputError::unless(holds, "the labels differ from the masks in coco.json")
 }

@@ -8,7 +8,7 @@ use std::fmt::Write;
 use super::depth::Depth;
 use super::sink::{Field, Files};
 use super::written::Written;
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 use crate::truth::{Split, outlines};
 
 pub(super) fn image(split: Split, index: u64) -> String {
@@ -52,7 +52,7 @@ pub(super) fn check(written: &Written) -> Result<(), Error> {
     let split = field.split();
     written.file(&image(split, field.frame.index), |bytes| written.image(bytes, Depth::Training))?;
     written.file(&labels(split, field.frame.index), |bytes| {
-        Problem::unless(bytes == text(field).as_bytes(), "the outlines differ from the masks in coco.json")
+        InputError::unless(bytes == text(field).as_bytes(), "the outlines differ from the masks in coco.json")
     })
 }
 

@@ -5,7 +5,7 @@ use std::ops::Range;
 use papsynth::truth::{LabelMap, Mask, Run};
 
 use super::file::Limits;
-use crate::error::Problem;
+use crate::error::InputError;
 
 /// A connected region of one label (8-connectivity).
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -39,7 +39,7 @@ impl Component {
 ///
 /// # Errors
 /// If there are more regions than the limit.
-pub fn components(labels: &LabelMap, limits: &Limits) -> Result<Vec<Component>, Problem> {
+pub fn components(labels: &LabelMap, limits: &Limits) -> Result<Vec<Component>, InputError> {
     let width = labels.width;
     if width == 0 {
         return Ok(Vec::new());
@@ -68,7 +68,7 @@ pub fn components(labels: &LabelMap, limits: &Limits) -> Result<Vec<Component>, 
     }
     if forest.trees > limits.max_regions {
         let limit = limits.max_regions;
-        return Err(Problem::unfit(format!(
+        return Err(InputError::unfit(format!(
             "the image has more than {limit} separate regions; expected a mask or label image, not a grey image"
         )));
     }

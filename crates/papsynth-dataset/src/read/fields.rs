@@ -9,7 +9,7 @@ use super::components::components;
 use super::file::{Limits, bytes, parse};
 use super::image::{LevelImage, read_label_map};
 use super::nucleus::{image_files, same_size};
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 use papsynth::white_level as white;
 
 /// Table with the group of each image of a folder.
@@ -125,7 +125,7 @@ impl FieldFile {
 /// Returns the fields of a folder that is not a data set, sorted by name.
 pub(crate) fn files_in(folder: &Path) -> Result<Vec<FieldFile>, Error> {
     let images = match image_files(folder) {
-        Err(Error::Input { problem: Problem::NoImages, .. }) if folder.join("images").is_dir() => {
+        Err(Error::Input { problem: InputError::NoImages, .. }) if folder.join("images").is_dir() => {
             image_files(&folder.join("images"))?
         }
         other => other?,
@@ -158,7 +158,7 @@ pub(crate) fn files_in(folder: &Path) -> Result<Vec<FieldFile>, Error> {
 }
 
 /// Gives each connected region of a binary mask a label. Label images are returned unchanged.
-fn separate(labels: LabelMap, limits: &Limits) -> Result<Vec<u32>, Problem> {
+fn separate(labels: LabelMap, limits: &Limits) -> Result<Vec<u32>, InputError> {
     let first = labels.ids.iter().copied().find(|id| *id != 0);
     if labels.ids.iter().any(|id| *id != 0 && Some(*id) != first) {
         return Ok(labels.ids);
@@ -174,7 +174,7 @@ fn separate(labels: LabelMap, limits: &Limits) -> Result<Vec<u32>, Problem> {
 }
 
 /// Parses a table of points `y,x`, with or without a header.
-fn points(bytes: &[u8]) -> Result<Vec<[f64; 2]>, Problem> {
+fn points(bytes: &[u8]) -> Result<Vec<[f64; 2]>, InputError> {
     let mut points = Vec::new();
     for (line, [y, x]) in rows(bytes)? {
         let number = |text: &str| text.parse::<f64>().ok().filter(|v| v.is_finite());
@@ -182,7 +182,7 @@ fn points(bytes: &[u8]) -> Result<Vec<[f64; 2]>, Problem> {
             (Some(y), Some(x)) => points.push([x, y]),
             _ if line == 1 && y == "y" && x == "x" => {}
             _ => {
-                return Err(Problem::Row {
+                return Err(InputError::Row {
                     line,
                     message: format!("found `{y},{x}`; expected two numbers: y,x in pixels"),
                 });
@@ -194,33 +194,33 @@ fn points(bytes: &[u8]) -> Result<Vec<[f64; 2]>, Problem> {
 
 /// Checks that at most half of the points are outside the image. More indicate another image, or x before y; a few
 /// outside the border are common.
-fn within(points: &[[f64; 2]], image: [usize; 2]) -> Result<(), Problem> {
+fn within(points: &[[f64; 2]], image: [usize; 2]) -> Result<(), InputError> {
     let inside = |p: &[f64; 2]| (0..2).all(|axis| (-0.5..image[axis] as f64 - 0.5).contains(&p[axis]));
     let outside = points.iter().filter(|p| !inside(p)).count();
     let (count, [width, height]) = (points.len(), image);
     let what = format!(
         "{outside} of {count} points are outside the image of {width} x {height} pixels; expected the columns y,x in pixels"
     );
-    Problem::unless(2 * outside <= count, what)
+    InputError::unless(2 * outside <= count, what)
 }
 
-fn groups(bytes: &[u8]) -> Result<BTreeMap<String, String>, Problem> {
+fn groups(bytes: &[u8]) -> Result<BTreeMap<String, String>, InputError> {
     let mut rows = rows(bytes)?.into_iter();
     match rows.next() {
         Some((_, header)) if header == GROUP_COLUMNS => Ok(rows.map(|(_, [frame, grade])| (frame, grade)).collect()),
-        _ => Err(Problem::Row { line: 1, message: format!("expected the columns {}", GROUP_COLUMNS.join(",")) }),
+        _ => Err(InputError::Row { line: 1, message: format!("expected the columns {}", GROUP_COLUMNS.join(",")) }),
     }
 }
 
-fn rows(bytes: &[u8]) -> Result<Vec<(u64, [String; 2])>, Problem> {
+fn rows(bytes: &[u8]) -> Result<Vec<(u64, [String; 2])>, InputError> {
     let mut reader =
         csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_reader(bytes);
     let mut rows = Vec::new();
     for record in reader.records() {
-        let record = record.map_err(|e| Problem::broken("CSV", e))?;
+        let record = record.map_err(|e| InputError::broken("CSV", e))?;
         let line = record.position().map_or(0, csv::Position::line);
         let (Some(a), Some(b), 2) = (record.get(0), record.get(1), record.len()) else {
-            return Err(Problem::Row { line, message: format!("{} values; expected 2", record.len()) });
+            return Err(InputError::Row { line, message: format!("{} values; expected 2", record.len()) });
         };
         rows.push((line, [a.trim_start_matches('\u{feff}').to_owned(), b.to_owned()]));
     }
@@ -239,7 +239,7 @@ mod tests {
         assert_eq!(points(b"y,x\n1.5,2\n").unwrap(), [[2.0, 1.5]]);
         assert_eq!(points(b"").unwrap(), [[0.0; 2]; 0]);
         for bad in ["1,2,3", "1", "a,b", "1,nan", "1,2\ny,x"] {
-            assert!(matches!(points(bad.as_bytes()), Err(Problem::Row { .. })), "{bad}");
+            assert!(matches!(points(bad.as_bytes()), Err(InputError::Row { .. })), "{bad}");
         }
     }
 

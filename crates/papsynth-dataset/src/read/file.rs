@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::Path;
 
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 
 /// Limits on the files that are read. The defaults are choices of this library.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,10 +35,10 @@ impl Default for Limits {
 
 impl Limits {
     /// Checks the size that an image file states, before memory is allocated for it.
-    pub(super) fn check(&self, width: u32, height: u32) -> Result<(), Problem> {
+    pub(super) fn check(&self, width: u32, height: u32) -> Result<(), InputError> {
         let pixels = u64::from(width) * u64::from(height);
         if width.max(height) > self.max_side_px || pixels > self.max_pixels || pixels == 0 {
-            return Err(Problem::ImageSize {
+            return Err(InputError::ImageSize {
                 width: width.into(),
                 height: height.into(),
                 max_side: self.max_side_px.into(),
@@ -52,7 +52,7 @@ impl Limits {
 pub(super) fn parse<T>(
     path: &Path,
     limits: &Limits,
-    parse: impl FnOnce(&[u8]) -> Result<T, Problem>,
+    parse: impl FnOnce(&[u8]) -> Result<T, InputError>,
 ) -> Result<T, Error> {
     parse(&bytes(path, limits.max_file_bytes)?).map_err(Error::input(path))
 }
@@ -60,14 +60,14 @@ pub(super) fn parse<T>(
 /// Reads a regular file of at most `limit` bytes.
 pub(crate) fn bytes(path: &Path, limit: u64) -> Result<Vec<u8>, Error> {
     let failed = |e: io::Error| match e.kind() {
-        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Error::input(path)(Problem::Missing("file")),
-        io::ErrorKind::IsADirectory => Error::input(path)(Problem::Folder),
+        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Error::input(path)(InputError::Missing("file")),
+        io::ErrorKind::IsADirectory => Error::input(path)(InputError::Folder),
         _ => Error::io("read", path)(e),
     };
     // Before the file is opened, because to open a named pipe waits for a writer.
     let metadata = fs::metadata(path).map_err(failed)?;
     if !metadata.is_file() && !metadata.is_dir() {
-        return Err(Error::input(path)(Problem::NotAFile));
+        return Err(Error::input(path)(InputError::NotAFile));
     }
     let file = File::open(path).map_err(failed)?;
     let size = metadata.len();
@@ -76,7 +76,7 @@ pub(crate) fn bytes(path: &Path, limit: u64) -> Result<Vec<u8>, Error> {
     file.take(limit.saturating_add(1)).read_to_end(&mut bytes).map_err(failed)?;
     let read = bytes.len() as u64;
     if read > limit {
-        return Err(Error::input(path)(Problem::FileSize { bytes: size.max(read), limit }));
+        return Err(Error::input(path)(InputError::FileSize { bytes: size.max(read), limit }));
     }
     Ok(bytes)
 }

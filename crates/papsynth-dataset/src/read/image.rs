@@ -8,7 +8,7 @@ use super::file::{Limits, parse};
 use super::jpeg;
 use super::raster::{Channels, Meaning, Raster, Samples, decode_png};
 use super::tiff;
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 
 pub(crate) const PNG_SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
@@ -32,11 +32,11 @@ impl GreyImage {
     ///
     /// # Errors
     /// If the bytes are not a complete image of grey pixels within the limits.
-    pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Self, Problem> {
+    pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Self, InputError> {
         Self::of(decode(bytes, limits, Meaning::Brightness)?)
     }
 
-    fn of(raster: Raster) -> Result<Self, Problem> {
+    fn of(raster: Raster) -> Result<Self, InputError> {
         let width = raster.width;
         let (grey, white) = levels(raster.grey()?)?;
         Ok(Self { width, grey, white })
@@ -82,11 +82,11 @@ impl LevelImage {
     ///
     /// # Errors
     /// If the bytes are not a complete image of opaque pixels within the limits.
-    pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Self, Problem> {
+    pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Self, InputError> {
         Self::of(decode(bytes, limits, Meaning::Brightness)?)
     }
 
-    fn of(raster: Raster) -> Result<Self, Problem> {
+    fn of(raster: Raster) -> Result<Self, InputError> {
         if raster.channels != Channels::Rgb {
             let GreyImage { width, grey: levels, white } = GreyImage::of(raster)?;
             return Ok(Self { width, channels: 1, levels, white });
@@ -100,8 +100,8 @@ impl LevelImage {
     pub(crate) fn pages(
         bytes: &[u8],
         limits: &Limits,
-        take: &mut dyn FnMut(Self) -> Result<(), Problem>,
-    ) -> Result<(), Problem> {
+        take: &mut dyn FnMut(Self) -> Result<(), InputError>,
+    ) -> Result<(), InputError> {
         match is_tiff(bytes) {
             true => tiff::pages(bytes, limits, &mut |raster| take(Self::of(raster)?)),
             false => take(Self::decode(bytes, limits)?),
@@ -127,11 +127,11 @@ impl LevelImage {
     }
 }
 
-fn levels(samples: Samples) -> Result<(Vec<u16>, u16), Problem> {
+fn levels(samples: Samples) -> Result<(Vec<u16>, u16), InputError> {
     match samples {
         Samples::U8(samples) => Ok((samples.into_iter().map(u16::from).collect(), u8::MAX.into())),
         Samples::U16(samples) => Ok((samples, u16::MAX)),
-        Samples::U32(_) | Samples::F32(_) => Err(Problem::samples("32 bit samples", "8 or 16 bit grey images")),
+        Samples::U32(_) | Samples::F32(_) => Err(InputError::samples("32 bit samples", "8 or 16 bit grey images")),
     }
 }
 
@@ -139,12 +139,12 @@ fn levels(samples: Samples) -> Result<(Vec<u16>, u16), Problem> {
 ///
 /// # Errors
 /// If the bytes are not a complete image of one channel within the limits.
-pub fn label_map(bytes: &[u8], limits: &Limits) -> Result<LabelMap, Problem> {
+pub fn label_map(bytes: &[u8], limits: &Limits) -> Result<LabelMap, InputError> {
     labels(decode(bytes, limits, Meaning::Labels)?)
 }
 
 /// Reads the label images of a TIFF file, one per page. More than `most` pages are an error.
-pub(crate) fn label_pages(bytes: &[u8], limits: &Limits, most: usize) -> Result<Vec<LabelMap>, Problem> {
+pub(crate) fn label_pages(bytes: &[u8], limits: &Limits, most: usize) -> Result<Vec<LabelMap>, InputError> {
     let mut pages = Vec::new();
     tiff::pages(bytes, limits, &mut |raster| {
         if pages.len() >= most {
@@ -156,14 +156,14 @@ pub(crate) fn label_pages(bytes: &[u8], limits: &Limits, most: usize) -> Result<
     Ok(pages)
 }
 
-fn labels(raster: Raster) -> Result<LabelMap, Problem> {
+fn labels(raster: Raster) -> Result<LabelMap, InputError> {
     let width = raster.width;
     let ids = match raster.grey()? {
         Samples::U8(samples) => samples.into_iter().map(u32::from).collect(),
         Samples::U16(samples) => samples.into_iter().map(u32::from).collect(),
         Samples::U32(samples) => samples,
         Samples::F32(_) => {
-            return Err(Problem::samples("floating-point samples", "8, 16 or 32 bit labels"));
+            return Err(InputError::samples("floating-point samples", "8, 16 or 32 bit labels"));
         }
     };
     Ok(LabelMap { width, ids })
@@ -177,7 +177,7 @@ pub fn read_label_map(path: &Path, limits: &Limits) -> Result<LabelMap, Error> {
     parse(path, limits, |bytes| label_map(bytes, limits))
 }
 
-pub(super) fn decode(bytes: &[u8], limits: &Limits, meaning: Meaning) -> Result<Raster, Problem> {
+pub(super) fn decode(bytes: &[u8], limits: &Limits, meaning: Meaning) -> Result<Raster, InputError> {
     if bytes.starts_with(PNG_SIGNATURE) {
         decode_png(bytes, limits, meaning)
     } else if is_tiff(bytes) {
@@ -188,9 +188,9 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits, meaning: Meaning) -> Result<
             Meaning::Labels => Err(jpeg::lossy_labels()),
         }
     } else if bytes.len() < PNG_SIGNATURE.len() && PNG_SIGNATURE.starts_with(bytes) && !bytes.is_empty() {
-        Err(Problem::Truncated("PNG"))
+        Err(InputError::Truncated("PNG"))
     } else {
-        Err(Problem::Format)
+        Err(InputError::Format)
     }
 }
 

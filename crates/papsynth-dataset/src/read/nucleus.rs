@@ -10,7 +10,7 @@ use papsynth::truth::{Bounds, LabelMap};
 use super::components::components;
 use super::file::Limits;
 use super::image::{GreyImage, read_label_map};
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 
 /// File name extensions of the images that are read, in lower case.
 const EXTENSIONS: [&str; 5] = ["png", "jpg", "jpeg", "tif", "tiff"];
@@ -40,16 +40,16 @@ impl NucleusSample {
     ///
     /// # Errors
     /// If the mask differs in size, is empty, has only one pixel, or has several connected components.
-    pub fn new(name: &str, image: GreyImage, mask: &LabelMap) -> Result<Self, Problem> {
+    pub fn new(name: &str, image: GreyImage, mask: &LabelMap) -> Result<Self, InputError> {
         same_size(mask, [image.width, image.grey.len()])?;
         let inside = LabelMap { width: mask.width, ids: mask.ids.iter().map(|&id| id.min(1)).collect() };
         let limits = Limits { max_regions: usize::MAX, ..Limits::default() };
         let parts = components(&inside, &limits)?;
         match parts.as_slice() {
-            [] => Err(Problem::unfit("the mask is empty; expected pixels above 0")),
+            [] => Err(InputError::unfit("the mask is empty; expected pixels above 0")),
             [one] => match (one.mask.area(), one.mask.bounds()) {
                 (1, Some(Bounds { x, y, .. })) => {
-                    Err(Problem::unfit(format!("the mask has only one pixel, at ({x}, {y}); expected more")))
+                    Err(InputError::unfit(format!("the mask has only one pixel, at ({x}, {y}); expected more")))
                 }
                 _ => {
                     let mask = inside.ids.iter().map(|&id| if id > 0 { 1.0 } else { 0.0 }).collect();
@@ -58,18 +58,18 @@ impl NucleusSample {
             },
             many => {
                 let count = many.len();
-                Err(Problem::unfit(format!("the mask has {count} connected components; expected 1")))
+                Err(InputError::unfit(format!("the mask has {count} connected components; expected 1")))
             }
         }
     }
 }
 
 /// Checks that a mask has the size of its image, given by width and number of pixels.
-pub(super) fn same_size(mask: &LabelMap, [width, pixels]: [usize; 2]) -> Result<(), Problem> {
+pub(super) fn same_size(mask: &LabelMap, [width, pixels]: [usize; 2]) -> Result<(), InputError> {
     let (rows, due) = (mask.ids.len() / mask.width.max(1), pixels / width.max(1));
     let sizes =
         format!("the mask is {} x {rows} pixels, the image {width} x {due}; expected the same size", mask.width);
-    Problem::unless([mask.width, rows] == [width, due], sizes)
+    InputError::unless([mask.width, rows] == [width, due], sizes)
 }
 
 /// Reads all nuclei of a folder with the subfolders `images` and `masks`.
@@ -92,7 +92,7 @@ pub fn read_pairs(images_folder: &Path, masks_folder: &Path, limits: &Limits) ->
     {
         if let Some((_, path)) = files.iter().find(|(name, _)| !others.contains_key(*name)) {
             let problem = format!("there is no {counterpart} of the same name in {}", elsewhere.display());
-            return Err(Error::input(path)(Problem::unfit(problem)));
+            return Err(Error::input(path)(InputError::unfit(problem)));
         }
     }
     let pairs = images.iter().zip(masks.values());
@@ -112,7 +112,7 @@ pub fn read_pairs(images_folder: &Path, masks_folder: &Path, limits: &Limits) ->
 /// If the folder has no such file, has images in other formats, or has two images that differ only in their extensions.
 pub fn image_files(folder: &Path) -> Result<BTreeMap<String, PathBuf>, Error> {
     let failed = |e: io::Error| match e.kind() {
-        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Error::input(folder)(Problem::Missing("folder")),
+        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Error::input(folder)(InputError::Missing("folder")),
         _ => Error::io("read", folder)(e),
     };
     let (mut found, mut others) = (BTreeMap::new(), Vec::new());
@@ -133,14 +133,14 @@ pub fn image_files(folder: &Path) -> Result<BTreeMap<String, PathBuf>, Error> {
         }
         if let Some(other) = found.insert(name, path.clone()) {
             let problem = format!("differs from {} only in its extension; keep one of them", other.display());
-            return Err(Error::input(&path)(Problem::unfit(problem)));
+            return Err(Error::input(&path)(InputError::unfit(problem)));
         }
     }
     if !others.is_empty() {
-        return Err(Error::input(folder)(Problem::unfit(unread(others))));
+        return Err(Error::input(folder)(InputError::unfit(unread(others))));
     }
     if found.is_empty() {
-        return Err(Error::input(folder)(Problem::NoImages));
+        return Err(Error::input(folder)(InputError::NoImages));
     }
     Ok(found)
 }

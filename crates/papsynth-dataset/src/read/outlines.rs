@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::file::{Limits, parse};
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 
 const COLUMNS: [&str; 4] = ["outline", "k", "x_px", "y_px"];
 
@@ -25,22 +25,23 @@ pub struct Outline {
 /// # Errors
 /// If a column is missing, a number is invalid or not finite, points are missing or out of order, or an outline has
 /// fewer than three points. The error gives the line.
-pub fn outlines(bytes: &[u8]) -> Result<Vec<Outline>, Problem> {
+pub fn outlines(bytes: &[u8]) -> Result<Vec<Outline>, InputError> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
     let header = reader.headers().map_err(broken)?;
     let mut places = [0; 4];
     for (place, name) in places.iter_mut().zip(COLUMNS) {
-        *place = header.iter().position(|h| h.trim_start_matches('\u{feff}') == name).ok_or_else(|| Problem::Row {
-            line: 1,
-            message: format!("the column `{name}` is missing; expected the columns {}", COLUMNS.join(",")),
-        })?;
+        *place =
+            header.iter().position(|h| h.trim_start_matches('\u{feff}') == name).ok_or_else(|| InputError::Row {
+                line: 1,
+                message: format!("the column `{name}` is missing; expected the columns {}", COLUMNS.join(",")),
+            })?;
     }
     let mut outlines: Vec<Outline> = Vec::new();
     let mut record = csv::StringRecord::new();
     while reader.read_record(&mut record).map_err(broken)? {
         let line = record.position().map_or(0, csv::Position::line);
         let [name, k, x, y] = places.map(|place| record.get(place).unwrap_or_default());
-        let wrong = |message: String| Problem::Row { line, message };
+        let wrong = |message: String| InputError::Row { line, message };
         let number = |column: &str, text: &str| match text.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
             _ => Err(wrong(format!("{column} is `{text}`; expected a finite number"))),
@@ -65,9 +66,9 @@ pub fn outlines(bytes: &[u8]) -> Result<Vec<Outline>, Problem> {
                 points.len(),
                 if points.len() == 1 { "" } else { "s" }
             );
-            Err(Problem::broken("CSV", message))
+            Err(InputError::broken("CSV", message))
         }
-        None if outlines.is_empty() => Err(Problem::broken("CSV", "the table has no outline")),
+        None if outlines.is_empty() => Err(InputError::broken("CSV", "the table has no outline")),
         None => Ok(outlines),
     }
 }
@@ -80,9 +81,9 @@ pub fn read_outlines(path: &Path, limits: &Limits) -> Result<Vec<Outline>, Error
     parse(path, limits, outlines)
 }
 
-fn broken(error: csv::Error) -> Problem {
+fn broken(error: csv::Error) -> InputError {
     match error.position() {
-        Some(position) => Problem::Row { line: position.line(), message: error.to_string() },
-        None => Problem::broken("CSV", error),
+        Some(position) => InputError::Row { line: position.line(), message: error.to_string() },
+        None => InputError::broken("CSV", error),
     }
 }

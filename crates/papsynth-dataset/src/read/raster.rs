@@ -5,7 +5,7 @@ use std::io::{Cursor, ErrorKind};
 use png::{BitDepth, ColorType, Decoder, DecodingError, Transformations};
 
 use super::file::Limits;
-use crate::error::Problem;
+use crate::error::InputError;
 
 /// Samples as stored in the file, in row-major order, channels interleaved.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,7 +46,7 @@ pub(super) struct Raster {
 
 impl Raster {
     /// Returns one channel, if all pixels are grey and opaque.
-    pub(super) fn grey(self) -> Result<Samples, Problem> {
+    pub(super) fn grey(self) -> Result<Samples, InputError> {
         let (channels, width) = (self.channels, self.width);
         Ok(match self.samples {
             Samples::U8(samples) => Samples::U8(grey(samples, channels, u8::MAX, width)?),
@@ -57,7 +57,12 @@ impl Raster {
     }
 }
 
-fn grey<T: Copy + PartialEq>(samples: Vec<T>, channels: Channels, opaque: T, width: usize) -> Result<Vec<T>, Problem> {
+fn grey<T: Copy + PartialEq>(
+    samples: Vec<T>,
+    channels: Channels,
+    opaque: T,
+    width: usize,
+) -> Result<Vec<T>, InputError> {
     let count = channels.count();
     let colours = match channels {
         Channels::Grey => return Ok(samples),
@@ -74,7 +79,7 @@ fn grey<T: Copy + PartialEq>(samples: Vec<T>, channels: Channels, opaque: T, wid
             } else {
                 return Ok(pixel[0]);
             };
-            Err(Problem::NotGrey { what, x: i % width, y: i / width })
+            Err(InputError::NotGrey { what, x: i % width, y: i / width })
         })
         .collect()
 }
@@ -90,7 +95,7 @@ pub(super) enum Meaning {
 /// Memory limit of the decoder for chunks other than image data, which are not used.
 const CHUNK_BYTES: usize = 1 << 20;
 
-pub(super) fn decode_png(bytes: &[u8], limits: &Limits, meaning: Meaning) -> Result<Raster, Problem> {
+pub(super) fn decode_png(bytes: &[u8], limits: &Limits, meaning: Meaning) -> Result<Raster, InputError> {
     let mut decoder = Decoder::new_with_limits(Cursor::new(bytes), png::Limits { bytes: CHUNK_BYTES });
     decoder.set_ignore_text_chunk(true);
     decoder.set_ignore_iccp_chunk(true);
@@ -130,9 +135,9 @@ fn unpack(rows: &[u8], bits: usize, width: usize, line_size: usize) -> Vec<u8> {
     rows.chunks_exact(line_size).flat_map(row).collect()
 }
 
-fn problem(error: DecodingError) -> Problem {
+fn problem(error: DecodingError) -> InputError {
     match error {
-        DecodingError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => Problem::Truncated("PNG"),
-        other => Problem::broken("PNG", other),
+        DecodingError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => InputError::Truncated("PNG"),
+        other => InputError::broken("PNG", other),
     }
 }

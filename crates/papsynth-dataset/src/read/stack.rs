@@ -8,7 +8,7 @@ use super::image::{decode, is_tiff};
 use super::nucleus::image_files;
 use super::raster::{Meaning, Raster, Samples};
 use super::tiff;
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 
 /// Largest number of pixels of all planes: 1 GiB in memory.
 const MOST_PIXELS: u64 = 1 << 28;
@@ -49,7 +49,7 @@ impl Stack {
     ///
     /// # Errors
     /// If the bytes are not complete grey images of the same size within the limits.
-    pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Self, Problem> {
+    pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Self, InputError> {
         let mut stack = Self::default();
         stack.add(bytes, limits)?;
         Ok(stack)
@@ -61,7 +61,7 @@ impl Stack {
         self.planes.first().map_or(0, |plane| plane.len() / self.width.max(1))
     }
 
-    fn add(&mut self, bytes: &[u8], limits: &Limits) -> Result<(), Problem> {
+    fn add(&mut self, bytes: &[u8], limits: &Limits) -> Result<(), InputError> {
         if is_tiff(bytes) {
             tiff::pages(bytes, limits, &mut |raster| self.push(raster))
         } else {
@@ -69,7 +69,7 @@ impl Stack {
         }
     }
 
-    fn push(&mut self, raster: Raster) -> Result<(), Problem> {
+    fn push(&mut self, raster: Raster) -> Result<(), InputError> {
         let width = raster.width;
         #[expect(clippy::cast_precision_loss, reason = "sensors have at most 24 bits")]
         let plane: Vec<f32> = match raster.grey()? {
@@ -79,11 +79,11 @@ impl Stack {
             Samples::F32(samples) => samples,
         };
         if plane.iter().any(|v| !v.is_finite()) {
-            return Err(Problem::samples("infinite or NaN samples", "finite grey samples"));
+            return Err(InputError::samples("infinite or NaN samples", "finite grey samples"));
         }
         let (found, first) = ([width, plane.len() / width.max(1)], [self.width, self.height()]);
         if !self.planes.is_empty() && found != first {
-            return Err(Problem::unfit(format!(
+            return Err(InputError::unfit(format!(
                 "plane {} is {} x {} pixels, the first {} x {}; expected planes of the same size",
                 self.planes.len(),
                 found[0],
@@ -93,7 +93,7 @@ impl Stack {
             )));
         }
         if (self.planes.len() as u64 + 1) * plane.len() as u64 > MOST_PIXELS {
-            return Err(Problem::unfit(format!(
+            return Err(InputError::unfit(format!(
                 "with this file the stack has more than {MOST_PIXELS} pixels; crop the images, or use fewer planes"
             )));
         }
@@ -161,7 +161,7 @@ mod tests {
         out.into_inner()
     }
 
-    fn decode(bytes: &[u8]) -> Result<Stack, Problem> {
+    fn decode(bytes: &[u8]) -> Result<Stack, InputError> {
         Stack::decode(bytes, &Limits::default())
     }
 
@@ -181,10 +181,10 @@ mod tests {
     #[test]
     fn invalid_stacks_are_refused() {
         let nan = pages::<colortype::Gray32Float>(&[&[0.5, f32::NAN]], 2);
-        assert!(matches!(decode(&nan), Err(Problem::Samples { .. })));
-        assert!(matches!(decode(&pages::<colortype::Gray64Float>(&[&[0.5]], 1)), Err(Problem::Samples { .. })));
-        assert!(matches!(decode(&pages::<colortype::RGB8>(&[&[7, 7, 8]], 1)), Err(Problem::NotGrey { .. })));
-        assert!(matches!(decode(b"no image"), Err(Problem::Format)));
+        assert!(matches!(decode(&nan), Err(InputError::Samples { .. })));
+        assert!(matches!(decode(&pages::<colortype::Gray64Float>(&[&[0.5]], 1)), Err(InputError::Samples { .. })));
+        assert!(matches!(decode(&pages::<colortype::RGB8>(&[&[7, 7, 8]], 1)), Err(InputError::NotGrey { .. })));
+        assert!(matches!(decode(b"no image"), Err(InputError::Format)));
         let good = pages::<colortype::Gray8>(&[&[0, 255], &[3, 4]], 2);
         for end in 0..good.len() {
             // A truncated file is refused, or all of its pages are complete.
@@ -193,7 +193,7 @@ mod tests {
             }
         }
         let one = Limits { max_pixels: 1, ..Limits::default() };
-        assert!(matches!(Stack::decode(&good, &one), Err(Problem::ImageSize { .. })));
+        assert!(matches!(Stack::decode(&good, &one), Err(InputError::ImageSize { .. })));
     }
 
     #[test]

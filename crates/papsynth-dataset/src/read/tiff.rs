@@ -9,7 +9,7 @@ use tiff::{ColorType, TiffError};
 use super::file::Limits;
 use super::jpeg;
 use super::raster::{Channels, Meaning, Raster, Samples};
-use crate::error::Problem;
+use crate::error::InputError;
 
 const ACCEPTED: &str = "8 or 16 bit (labels: also 32 bit) unsigned grey samples";
 const ACCEPTED_PAGES: &str = "8, 16 or 32 bit unsigned or 32 bit floating-point grey samples";
@@ -20,18 +20,18 @@ const CHUNKY: u16 = 1;
 /// A decoder positioned at one of the images of a file.
 type Reader<'a> = Decoder<Cursor<&'a [u8]>>;
 
-pub(super) fn decode(bytes: &[u8], limits: &Limits, meaning: Meaning) -> Result<Raster, Problem> {
+pub(super) fn decode(bytes: &[u8], limits: &Limits, meaning: Meaning) -> Result<Raster, InputError> {
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(problem)?;
     if decoder.more_images() {
         // Errors of the first image are reported before the number of images.
         shape(&mut decoder, limits, ACCEPTED)?;
-        return Err(Problem::unfit("the file has several images; expected one image in the file"));
+        return Err(InputError::unfit("the file has several images; expected one image in the file"));
     }
     if meaning == Meaning::Labels && is_jpeg(&mut decoder)? {
         return Err(jpeg::lossy_labels());
     }
     match page(decoder, bytes, limits, ACCEPTED)?.0 {
-        Raster { samples: Samples::F32(_), .. } => Err(Problem::samples("floating-point samples", ACCEPTED)),
+        Raster { samples: Samples::F32(_), .. } => Err(InputError::samples("floating-point samples", ACCEPTED)),
         raster => Ok(raster),
     }
 }
@@ -40,8 +40,8 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits, meaning: Meaning) -> Result<
 pub(super) fn pages(
     bytes: &[u8],
     limits: &Limits,
-    take: &mut dyn FnMut(Raster) -> Result<(), Problem>,
-) -> Result<(), Problem> {
+    take: &mut dyn FnMut(Raster) -> Result<(), InputError>,
+) -> Result<(), InputError> {
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(problem)?;
     loop {
         let (raster, rest) = page(decoder, bytes, limits, ACCEPTED_PAGES)?;
@@ -56,7 +56,7 @@ pub(super) fn pages(
 
 /// Reads the pages of a file of 32-bit floating-point numbers with any number of channels. More than `most` pages are
 /// an error, because many directory entries of a short file may refer to the same data.
-pub(crate) fn float_pages(bytes: &[u8], limits: &Limits, most: usize) -> Result<Vec<Vec<f32>>, Problem> {
+pub(crate) fn float_pages(bytes: &[u8], limits: &Limits, most: usize) -> Result<Vec<Vec<f32>>, InputError> {
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(problem)?;
     let mut pages = Vec::new();
     loop {
@@ -68,7 +68,7 @@ pub(crate) fn float_pages(bytes: &[u8], limits: &Limits, most: usize) -> Result<
         tiff_limits.decoding_buffer_size = (width as usize * height as usize).saturating_mul(12);
         decoder = decoder.with_limits(tiff_limits);
         let DecodingResult::F32(samples) = decoder.read_image().map_err(problem)? else {
-            return Err(Problem::samples("integers", "floating-point samples"));
+            return Err(InputError::samples("integers", "floating-point samples"));
         };
         pages.push(samples);
         if !decoder.more_images() {
@@ -81,19 +81,23 @@ pub(crate) fn float_pages(bytes: &[u8], limits: &Limits, most: usize) -> Result<
     }
 }
 
-pub(super) fn too_many(most: usize) -> Problem {
-    Problem::unfit(format!("the file has more than {most} pages"))
+pub(super) fn too_many(most: usize) -> InputError {
+    InputError::unfit(format!("the file has more than {most} pages"))
 }
 
 /// Returns the description (`ImageDescription`) of the first page of a file, if there is one.
-pub(crate) fn description(bytes: &[u8]) -> Result<Option<String>, Problem> {
+pub(crate) fn description(bytes: &[u8]) -> Result<Option<String>, InputError> {
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(problem)?;
     let Some(value) = decoder.find_tag(Tag::ImageDescription).map_err(problem)? else { return Ok(None) };
     value.into_string().map(Some).map_err(problem)
 }
 
 /// Returns the columns, the number of pixels, and the channels of the image at which the decoder is.
-fn shape(decoder: &mut Reader, limits: &Limits, accepted: &'static str) -> Result<(usize, usize, Channels), Problem> {
+fn shape(
+    decoder: &mut Reader,
+    limits: &Limits,
+    accepted: &'static str,
+) -> Result<(usize, usize, Channels), InputError> {
     let (width, height) = decoder.dimensions().map_err(problem)?;
     limits.check(width, height)?;
     let colour = decoder.colortype().map_err(problem)?;
@@ -103,11 +107,11 @@ fn shape(decoder: &mut Reader, limits: &Limits, accepted: &'static str) -> Resul
         ColorType::RGB(8 | 16) => Channels::Rgb,
         ColorType::YCbCr(8) if is_jpeg(decoder)? => Channels::Rgb,
         ColorType::RGBA(8 | 16) => Channels::Rgba,
-        other => return Err(Problem::samples(described(other), accepted)),
+        other => return Err(InputError::samples(described(other), accepted)),
     };
     let planar = decoder.find_tag_unsigned::<u16>(Tag::PlanarConfiguration).map_err(problem)?;
     if channels.count() > 1 && planar.is_some_and(|p| p != CHUNKY) {
-        return Err(Problem::samples("channels in separate planes", accepted));
+        return Err(InputError::samples("channels in separate planes", accepted));
     }
     Ok((width as usize, width as usize * height as usize, channels))
 }
@@ -126,14 +130,14 @@ fn described(colour: ColorType) -> String {
     format!("{name} samples of {bits} bits")
 }
 
-fn is_jpeg(decoder: &mut Reader) -> Result<bool, Problem> {
+fn is_jpeg(decoder: &mut Reader) -> Result<bool, InputError> {
     let compression = decoder.find_tag_unsigned::<u16>(Tag::Compression).map_err(problem)?;
     Ok(compression == Some(CompressionMethod::ModernJPEG.to_u16()))
 }
 
 /// Checks the JPEG streams of the image at which the decoder is: their sizes, and that the file has all of their bytes.
 /// The library checks neither.
-fn check_jpeg(decoder: &mut Reader, bytes: &[u8], limits: &Limits) -> Result<(), Problem> {
+fn check_jpeg(decoder: &mut Reader, bytes: &[u8], limits: &Limits) -> Result<(), InputError> {
     if !is_jpeg(decoder)? {
         return Ok(());
     }
@@ -142,7 +146,7 @@ fn check_jpeg(decoder: &mut Reader, bytes: &[u8], limits: &Limits) -> Result<(),
         let [offsets, sizes] = tags.map(|tag| decoder.find_tag(tag).ok().flatten().and_then(|v| v.into_u64_vec().ok()));
         let ends = offsets.unwrap_or_default().into_iter().zip(sizes.unwrap_or_default());
         if ends.into_iter().any(|(offset, size)| offset.saturating_add(size) > bytes.len() as u64) {
-            return Err(Problem::Truncated("TIFF"));
+            return Err(InputError::Truncated("TIFF"));
         }
     }
     Ok(())
@@ -153,7 +157,7 @@ fn page<'a>(
     bytes: &[u8],
     limits: &Limits,
     accepted: &'static str,
-) -> Result<(Raster, Reader<'a>), Problem> {
+) -> Result<(Raster, Reader<'a>), InputError> {
     let (width, pixels, channels) = shape(&mut decoder, limits, accepted)?;
     check_jpeg(&mut decoder, bytes, limits)?;
     let is_ycbcr = matches!(decoder.colortype().map_err(problem)?, ColorType::YCbCr(_));
@@ -173,19 +177,19 @@ fn page<'a>(
         DecodingResult::U32(samples) => (samples.len(), Samples::U32(samples)),
         DecodingResult::F32(samples) => (samples.len(), Samples::F32(samples)),
         DecodingResult::F16(_) | DecodingResult::F64(_) => {
-            return Err(Problem::samples("16 or 64 bit floating-point samples", accepted));
+            return Err(InputError::samples("16 or 64 bit floating-point samples", accepted));
         }
-        _ => return Err(Problem::samples("signed or 64 bit samples", accepted)),
+        _ => return Err(InputError::samples("signed or 64 bit samples", accepted)),
     };
     if found != pixels * channels.count() {
-        return Err(Problem::broken("TIFF", format!("{found} samples for {pixels} pixels")));
+        return Err(InputError::broken("TIFF", format!("{found} samples for {pixels} pixels")));
     }
     Ok((Raster { width, channels, samples }, decoder))
 }
 
-fn problem(error: TiffError) -> Problem {
+fn problem(error: TiffError) -> InputError {
     match error {
-        TiffError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => Problem::Truncated("TIFF"),
-        other => Problem::broken("TIFF", other),
+        TiffError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => InputError::Truncated("TIFF"),
+        other => InputError::broken("TIFF", other),
     }
 }

@@ -11,7 +11,7 @@ use super::file::{Limits, bytes};
 use super::image::{GreyImage, PNG_SIGNATURE, label_map};
 use super::jpeg;
 use crate::bytes::sha256;
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 
 /// A file that a recipe names.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -41,7 +41,7 @@ pub fn read_inputs(recipe: &mut Recipe, folder: &Path, limits: &Limits) -> Resul
 }
 
 /// Returns the weights: of an image, levels divided by the largest level of its type; of labels, 1 inside objects.
-fn weights(bytes: &[u8], is_grey: bool, limits: &Limits) -> Result<WeightMap, Problem> {
+fn weights(bytes: &[u8], is_grey: bool, limits: &Limits) -> Result<WeightMap, InputError> {
     let map = if is_grey {
         let image = GreyImage::decode(bytes, limits)?;
         WeightMap { width: image.width, weights: image.fractions() }
@@ -50,7 +50,7 @@ fn weights(bytes: &[u8], is_grey: bool, limits: &Limits) -> Result<WeightMap, Pr
         WeightMap { width, weights: ids.iter().map(|&id| if id > 0 { 1.0 } else { 0.0 }).collect() }
     };
     let has_place = map.weights.iter().any(|&w| w > 0.0);
-    Problem::unless(has_place, "all pixels are 0; expected at least one pixel above 0").map(|()| map)
+    InputError::unless(has_place, "all pixels are 0; expected at least one pixel above 0").map(|()| map)
 }
 
 /// Returns the name of a map in a data set, from the start of its SHA-256.

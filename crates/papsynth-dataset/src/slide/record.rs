@@ -10,7 +10,7 @@ use serde_json::{Map, json};
 
 use crate::bytes::{self, json_lines, sha256};
 use crate::dataset::{Identity, SLIDE, WRITER, is_inside};
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 use crate::files::{FileRecord, Folder};
 use crate::formats::channels;
 
@@ -103,9 +103,9 @@ impl SlideHead {
     ///
     /// # Errors
     /// If it is invalid or of another version.
-    pub fn from_json(bytes: &[u8]) -> Result<Self, Problem> {
+    pub fn from_json(bytes: &[u8]) -> Result<Self, InputError> {
         let head: Self = serde_json::from_slice(bytes)?;
-        let invalid = |message: String| Err(Problem::broken("JSON", message));
+        let invalid = |message: String| Err(InputError::broken("JSON", message));
         if head.format != FORMAT || head.version != VERSION {
             let (format, version) = (head.format.escape_default().to_string(), head.version);
             return invalid(format!("format `{format}`, version {version}; expected `{FORMAT}`, version {VERSION}"));
@@ -189,9 +189,9 @@ impl SlideRecord {
     ///
     /// # Errors
     /// If it is invalid, was changed after it was written, or lists a file outside the slide.
-    pub fn from_json(bytes: &[u8]) -> Result<Self, Problem> {
+    pub fn from_json(bytes: &[u8]) -> Result<Self, InputError> {
         let record: Self = serde_json::from_slice(bytes)?;
-        let invalid = |message: &str| Err(Problem::broken("JSON", message));
+        let invalid = |message: &str| Err(InputError::broken("JSON", message));
         if !record.files.iter().all(|file| is_inside(&file.path)) {
             return invalid("lists a file outside the slide");
         }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::frame::{Category, FrameSummary, category_name, group};
 use super::rle;
-use crate::error::Problem;
+use crate::error::InputError;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Rle {
@@ -20,7 +20,7 @@ impl Rle {
         Self { size: [height, width], counts: rle::encode(mask, width, height) }
     }
 
-    fn mask(&self) -> Result<Mask, Problem> {
+    fn mask(&self) -> Result<Mask, InputError> {
         let [height, width] = self.size;
         rle::decode(&self.counts, width, height)
     }
@@ -136,7 +136,7 @@ impl Annotation {
     }
 
     /// Returns the group and the complete mask.
-    pub(crate) fn amodal(&self) -> Result<(Group, Mask), Problem> {
+    pub(crate) fn amodal(&self) -> Result<(Group, Mask), InputError> {
         Ok((group(self.part), self.segmentation.mask()?))
     }
 
@@ -144,10 +144,10 @@ impl Annotation {
     ///
     /// # Errors
     /// If a mask is invalid, or differs from its box or areas.
-    pub(crate) fn object(&self) -> Result<ObjectTruth, Problem> {
+    pub(crate) fn object(&self) -> Result<ObjectTruth, InputError> {
         let (amodal, visible) = (self.segmentation.mask()?, self.visible.mask()?);
         let wrong =
-            |what: &str| Problem::broken("COCO", format!("annotation {}: {what} differs from the mask", self.id));
+            |what: &str| InputError::broken("COCO", format!("annotation {}: {what} differs from the mask", self.id));
         let claims: [(&str, bool); 4] = [
             ("area", self.area == amodal.area()),
             ("bbox", self.bbox == box_of(&amodal)),
@@ -158,7 +158,7 @@ impl Annotation {
             return Err(wrong(what));
         }
         let unknown = |what: &str, found: &str| {
-            Problem::broken("COCO", format!("annotation {}: unknown {what} `{}`", self.id, found.escape_default()))
+            InputError::broken("COCO", format!("annotation {}: unknown {what} `{}`", self.id, found.escape_default()))
         };
         let kind = ObjectKind::ALL.into_iter().find(|kind| kind.name() == self.kind);
         let tint =
@@ -253,7 +253,7 @@ impl Document {
     }
 
     /// Returns the saturated pixels of each plane of an image; empty if there are none.
-    pub(crate) fn saturated(&self, index: u64) -> Result<Vec<Mask>, Problem> {
+    pub(crate) fn saturated(&self, index: u64) -> Result<Vec<Mask>, InputError> {
         self.image(index).map_or(&[][..], |image| &image.saturated).iter().map(Rle::mask).collect()
     }
 
@@ -261,15 +261,16 @@ impl Document {
     ///
     /// # Errors
     /// If the document does not have the frame, or is inconsistent.
-    pub(crate) fn truth(&self, index: u64) -> Result<Truth, Problem> {
-        let image =
-            self.image(index).ok_or_else(|| Problem::broken("COCO", format!("the document has no image {index}")))?;
+    pub(crate) fn truth(&self, index: u64) -> Result<Truth, InputError> {
+        let image = self
+            .image(index)
+            .ok_or_else(|| InputError::broken("COCO", format!("the document has no image {index}")))?;
         let of_frame = self.annotations.iter().filter(|annotation| annotation.image_id == index);
         let objects: Vec<ObjectTruth> = of_frame.map(Annotation::object).collect::<Result<_, _>>()?;
         match objects.iter().find(|object| leaves(object, image.width, image.height)) {
             Some(object) => {
                 let message = format!("image {index}: the mask of object {} extends beyond the image", object.id);
-                Err(Problem::broken("COCO", message))
+                Err(InputError::broken("COCO", message))
             }
             None => Ok(Truth { width: image.width, height: image.height, objects }),
         }
@@ -281,7 +282,7 @@ impl Document {
 ///
 /// # Errors
 /// If the document is invalid, or boxes or areas differ from the masks.
-pub fn truths(bytes: &[u8]) -> Result<Vec<(u64, Truth)>, Problem> {
+pub fn truths(bytes: &[u8]) -> Result<Vec<(u64, Truth)>, InputError> {
     let document: Document = serde_json::from_slice(bytes)?;
     document.images.iter().map(|image| Ok((image.id, document.truth(image.id)?))).collect()
 }

@@ -56,6 +56,12 @@ pub struct FrameSummary {
 }
 
 impl FrameSummary {
+    /// Returns the number of requested cells for which there was no room.
+    #[must_use]
+    pub fn unplaced(&self) -> u64 {
+        self.cells.values().map(|count| count.requested.saturating_sub(count.placed)).sum()
+    }
+
     /// Returns the largest level of the camera.
     #[must_use]
     pub fn white(&self) -> u16 {

@@ -5,7 +5,7 @@
 
 use papsynth::truth::{Mask, Run};
 
-use crate::error::Problem;
+use crate::error::InputError;
 
 /// Largest width or height of a decoded mask, the largest size of a field. It bounds the memory for a short string.
 const MAX_SIDE: usize = 1 << 15;
@@ -97,8 +97,8 @@ fn push(mut value: i64, out: &mut String) {
 ///
 /// # Errors
 /// If the string is invalid, or the counts do not fill the image exactly.
-pub fn decode(counts: &str, width: usize, height: usize) -> Result<Mask, Problem> {
-    let wrong = |message: String| Problem::broken("RLE", message);
+pub fn decode(counts: &str, width: usize, height: usize) -> Result<Mask, InputError> {
+    let wrong = |message: String| InputError::broken("RLE", message);
     if width.max(height) > MAX_SIDE {
         return Err(wrong(format!("the image is {width} x {height} pixels; expected at most {MAX_SIDE} per side")));
     }

@@ -6,7 +6,7 @@ use crate::support::{SEED, Scratch, contents, frame, recipe};
 use papsynth::model::Model;
 use papsynth_dataset::read::{GreyImage, Limits, label_map, outlines};
 use papsynth_dataset::{
-    Check, Dataset, DatasetInfo, Format, Layout, Manifest, Problem, ShardRecord, clean, convert, inspect, verify,
+    Check, Dataset, DatasetInfo, Format, InputError, Layout, Manifest, ShardRecord, clean, convert, inspect, verify,
 };
 use proptest::prelude::*;
 use std::fs;
@@ -189,7 +189,7 @@ fn images_with_huge_sizes_are_refused() {
                 label_map(&bytes, &limits).map(|_| ()).unwrap_err(),
             ];
             assert!(
-                problems.iter().all(|p| matches!(p, Problem::ImageSize { .. })),
+                problems.iter().all(|p| matches!(p, InputError::ImageSize { .. })),
                 "{width} x {height}: {problems:?}"
             );
         }
@@ -202,7 +202,7 @@ fn images_with_huge_sizes_are_refused() {
         tiff(8192, 8192, 8192, u32::MAX),
     ] {
         let problem = GreyImage::decode(&bytes, &limits).unwrap_err();
-        assert!(matches!(problem, Problem::Truncated { .. } | Problem::Broken { .. }), "{problem:?}");
+        assert!(matches!(problem, InputError::Truncated { .. } | InputError::Broken { .. }), "{problem:?}");
     }
 }
 

@@ -14,7 +14,7 @@ use papsynth_dataset::read::{
     GreyImage, LevelImage, Limits, NucleusSample, Stack, components, image_files, label_map, outlines, read_inputs,
     read_label_map, read_nuclei, read_outlines,
 };
-use papsynth_dataset::{Error, Problem};
+use papsynth_dataset::{Error, InputError};
 use png::{BitDepth, ColorType};
 use proptest::prelude::*;
 use tiff::encoder::{Compression, TiffEncoder, colortype};
@@ -47,11 +47,11 @@ where
     out.into_inner()
 }
 
-fn grey(bytes: &[u8]) -> Result<GreyImage, Problem> {
+fn grey(bytes: &[u8]) -> Result<GreyImage, InputError> {
     GreyImage::decode(bytes, &Limits::default())
 }
 
-fn labels(bytes: &[u8]) -> Result<LabelMap, Problem> {
+fn labels(bytes: &[u8]) -> Result<LabelMap, InputError> {
     label_map(bytes, &Limits::default())
 }
 
@@ -79,15 +79,15 @@ fn grey_images_of_every_depth_are_read() {
 fn colour_images_are_refused_unless_all_pixels_are_grey() {
     let rgb = |bytes: &[u8]| png(bytes, [2, 1], ColorType::Rgb, BitDepth::Eight);
     assert_eq!(grey(&rgb(&[5, 5, 5, 6, 6, 6])).unwrap().grey, [5, 6]);
-    assert_eq!(grey(&rgb(&[5, 5, 5, 6, 7, 6])), Err(Problem::NotGrey { what: "coloured", x: 1, y: 0 }));
+    assert_eq!(grey(&rgb(&[5, 5, 5, 6, 7, 6])), Err(InputError::NotGrey { what: "coloured", x: 1, y: 0 }));
     let alpha = |bytes: &[u8]| png(bytes, [1, 2], ColorType::GrayscaleAlpha, BitDepth::Eight);
     assert_eq!(grey(&alpha(&[5, 255, 6, 255])).unwrap().grey, [5, 6]);
-    assert_eq!(grey(&alpha(&[5, 255, 6, 254])), Err(Problem::NotGrey { what: "transparent", x: 0, y: 1 }));
+    assert_eq!(grey(&alpha(&[5, 255, 6, 254])), Err(InputError::NotGrey { what: "transparent", x: 0, y: 1 }));
     let palette = png(&[0b0001_1000], [3, 1], ColorType::Indexed, BitDepth::Two);
-    assert_eq!(grey(&palette), Err(Problem::NotGrey { what: "coloured", x: 1, y: 0 }));
+    assert_eq!(grey(&palette), Err(InputError::NotGrey { what: "coloured", x: 1, y: 0 }));
     assert_eq!(labels(&palette).unwrap(), map(3, &[0, 1, 2]));
     let colours = tiff::<colortype::RGB8>(&[1, 1, 1, 1, 2, 1], [2, 1], 1);
-    assert_eq!(grey(&colours), Err(Problem::NotGrey { what: "coloured", x: 1, y: 0 }));
+    assert_eq!(grey(&colours), Err(InputError::NotGrey { what: "coloured", x: 1, y: 0 }));
 }
 
 #[test]
@@ -185,7 +185,7 @@ fn jpeg_files_are_read_alone_and_in_tiff() {
 
 #[test]
 fn jpeg_files_are_refused_where_they_are_unsuitable() {
-    let says = |problem: Problem, what: &str| assert!(problem.to_string().contains(what), "{problem}");
+    let says = |problem: InputError, what: &str| assert!(problem.to_string().contains(what), "{problem}");
     says(labels(&corpus("jpeg-grey.jpg")).unwrap_err(), "which changes labels");
     says(labels(&corpus("jpeg-grey.tif")).unwrap_err(), "which changes labels");
     says(grey(&corpus("jpeg-colour.jpg")).unwrap_err(), "is coloured");

@@ -7,7 +7,7 @@ mod nucleus;
 
 use fsd_shape::{CovarianceModel, ShapeModel, ShapeModelParams};
 
-use crate::error::{Cause, Error};
+use crate::error::{Error, ErrorKind};
 use crate::model::{CellClass, Donor, LogNormal, Model, Normal, Provenance, Shapes};
 
 use nucleus::NucleusMeasurement;
@@ -67,9 +67,9 @@ pub fn learn(base: &Model, material: &Material, params: &LearnParams) -> Result<
     learned(base, material, params).map_err(|cause| Error::Learn { class: params.class.clone(), cause })
 }
 
-fn learned(base: &Model, material: &Material, params: &LearnParams) -> Result<Model, Cause> {
+fn learned(base: &Model, material: &Material, params: &LearnParams) -> Result<Model, ErrorKind> {
     if !(params.pixel_um.is_finite() && (0.05..=4.0).contains(&params.pixel_um)) {
-        return Err(Cause::PixelSize(params.pixel_um));
+        return Err(ErrorKind::PixelSize(params.pixel_um));
     }
     let mut class = base.class(&params.like)?.clone();
     let mut provenance = Vec::new();
@@ -117,7 +117,7 @@ fn learned(base: &Model, material: &Material, params: &LearnParams) -> Result<Mo
 ///
 /// # Errors
 /// If the mask is empty, has several components, or its size is not a multiple of `width`.
-pub fn outline(mask: &[f32], width: usize, points: usize) -> Result<Vec<Point>, Cause> {
+pub fn outline(mask: &[f32], width: usize, points: usize) -> Result<Vec<Point>, ErrorKind> {
     Ok(nucleus::outline(mask, width, points)?)
 }
 
@@ -127,17 +127,17 @@ fn shapes(
     harmonics: usize,
     pixel_um: f64,
     what: &'static str,
-) -> Result<(Shapes, LogNormal), Cause> {
+) -> Result<(Shapes, LogNormal), ErrorKind> {
     if outlines.len() < MIN_OUTLINES {
-        return Err(Cause::TooFewOutlines { found: outlines.len(), what, least: MIN_OUTLINES });
+        return Err(ErrorKind::TooFewOutlines { found: outlines.len(), what, least: MIN_OUTLINES });
     }
     if let Some(index) = outlines.iter().position(|outline| fsd_shape::self_intersects(outline)) {
-        return Err(Cause::CrossedOutline(index, what));
+        return Err(ErrorKind::CrossedOutline(index, what));
     }
     let fit = |covariance: CovarianceModel| {
         let params = ShapeModelParams { harmonics, covariance };
         let model = ShapeModel::fit(outlines, &params);
-        model.and_then(|model| model.statistics().rounded(DIGITS)).map_err(|error| Cause::Outlines(what, error))
+        model.and_then(|model| model.statistics().rounded(DIGITS)).map_err(|error| ErrorKind::Outlines(what, error))
     };
     let correlated = fit(ShapeModelParams::default().covariance)?;
     let radius = LogNormal {

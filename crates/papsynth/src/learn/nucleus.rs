@@ -1,6 +1,6 @@
 //! Measurements on the image of a nucleus.
 
-use crate::error::{Cause, NucleusError};
+use crate::error::{ErrorKind, NucleusError};
 use crate::model::{Donor, OUTSIDE};
 
 /// A point in pixels: x right, y down.
@@ -38,8 +38,8 @@ pub(super) struct NucleusMeasurement {
 
 impl NucleusImage {
     /// Measures absorbance inside the mask relative to the surroundings of the nucleus (Eq. 11): A = −log₁₀(I₁/I₀).
-    pub(super) fn measure(&self) -> Result<NucleusMeasurement, Cause> {
-        self.measured().map_err(|cause| Cause::Nucleus { name: self.name.clone(), cause })
+    pub(super) fn measure(&self) -> Result<NucleusMeasurement, ErrorKind> {
+        self.measured().map_err(|cause| ErrorKind::Nucleus { name: self.name.clone(), cause })
     }
 
     fn measured(&self) -> Result<NucleusMeasurement, NucleusError> {

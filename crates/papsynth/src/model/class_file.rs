@@ -3,7 +3,7 @@
 use serde_json::{Map, Value};
 
 use super::{CellClass, MODEL_VERSION, Model, Provenance};
-use crate::error::{Cause, Error};
+use crate::error::{Error, ErrorKind};
 
 /// Class files of the built-in model.
 const BUILTIN_CLASSES: [&str; 2] = [include_str!("../../model/cervix.toml"), include_str!("../../model/oral.toml")];
@@ -49,31 +49,31 @@ impl Model {
 }
 
 /// Returns a model with the classes of a text added.
-fn merged(base: &Model, text: &str) -> Result<Model, Cause> {
+fn merged(base: &Model, text: &str) -> Result<Model, ErrorKind> {
     let value: Value = if text.trim_start().starts_with('{') {
-        serde_json::from_str(text).map_err(Cause::NotAModel)?
+        serde_json::from_str(text).map_err(ErrorKind::NotAModel)?
     } else {
-        toml::from_str(text).map_err(Cause::NotAClassFile)?
+        toml::from_str(text).map_err(ErrorKind::NotAClassFile)?
     };
-    let Value::Object(mut file) = value else { return Err(Cause::NotATable) };
+    let Value::Object(mut file) = value else { return Err(ErrorKind::NotATable) };
     let version = file.remove("version");
     if version.as_ref().and_then(Value::as_u64) != Some(u64::from(MODEL_VERSION)) {
         let found = version.map_or_else(|| "missing".to_owned(), |v| v.to_string());
-        return Err(Cause::ModelVersion(found, MODEL_VERSION));
+        return Err(ErrorKind::ModelVersion(found, MODEL_VERSION));
     }
     let mut model = base.clone();
     if let Some(provenance) = file.remove("provenance") {
-        let entries: Vec<Provenance> = serde_json::from_value(provenance).map_err(Cause::Provenance)?;
+        let entries: Vec<Provenance> = serde_json::from_value(provenance).map_err(ErrorKind::Provenance)?;
         model.provenance.retain(|old| !entries.contains(old));
         model.provenance.extend(entries);
     }
     let classes = match file.remove("classes") {
         Some(Value::Object(classes)) => classes,
-        Some(_) => return Err(Cause::ClassesNotATable),
+        Some(_) => return Err(ErrorKind::ClassesNotATable),
         None => Map::new(),
     };
     if let Some(unknown) = file.keys().next() {
-        return Err(Cause::UnknownField(unknown.clone()));
+        return Err(ErrorKind::UnknownField(unknown.clone()));
     }
     let mut unresolved = classes;
     // `like` may name a class of the same file, before or after this one.
@@ -84,12 +84,12 @@ fn merged(base: &Model, text: &str) -> Result<Model, Cause> {
             .map(|(name, _)| name.clone())
             .collect();
         if ready.is_empty() {
-            return Err(Cause::ClassCircle(unresolved.keys().cloned().collect()));
+            return Err(ErrorKind::ClassCircle(unresolved.keys().cloned().collect()));
         }
         for name in ready {
             let Some(class) = unresolved.remove(&name) else { continue };
             let class = resolved(&model, class)
-                .map_err(|cause| Cause::Class { class: name.clone(), cause: Box::new(cause) })?;
+                .map_err(|cause| ErrorKind::Class { class: name.clone(), cause: Box::new(cause) })?;
             model.classes.insert(name, class);
         }
     }
@@ -101,7 +101,7 @@ fn like(class: &Value) -> Option<&str> {
     class.get("like").and_then(Value::as_str)
 }
 
-fn resolved(model: &Model, mut class: Value) -> Result<CellClass, Cause> {
+fn resolved(model: &Model, mut class: Value) -> Result<CellClass, ErrorKind> {
     let complete = match like(&class).map(str::to_owned) {
         None => class,
         Some(of) => {

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use fsd_shape::ShapeStatistics;
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Cause, Error, within};
+use crate::error::{Error, ErrorKind, within};
 
 /// Version of the model format that this crate reads and writes.
 pub const MODEL_VERSION: u32 = 1;
@@ -125,7 +125,7 @@ impl OutlineForm {
         *self == Self::default()
     }
 
-    fn check(&self, path: &str) -> Result<(), Cause> {
+    fn check(&self, path: &str) -> Result<(), ErrorKind> {
         if let Some(elongation) = &self.elongation {
             elongation.check(&format!("{path}.elongation"), 0.0, 0.9)?;
         }
@@ -244,9 +244,9 @@ impl Model {
             version: u32,
         }
         let read = || {
-            let found = serde_json::from_str::<Version>(text).map_err(Cause::NotAModel)?.version;
+            let found = serde_json::from_str::<Version>(text).map_err(ErrorKind::NotAModel)?.version;
             if found != MODEL_VERSION {
-                return Err(Cause::ModelVersion(found.to_string(), MODEL_VERSION));
+                return Err(ErrorKind::ModelVersion(found.to_string(), MODEL_VERSION));
             }
             let model: Self = serde_json::from_str(text)?;
             model.checked().map(|()| model)
@@ -273,10 +273,10 @@ impl Model {
         self.checked().map_err(Error::Model)
     }
 
-    pub(crate) fn checked(&self) -> Result<(), Cause> {
+    pub(crate) fn checked(&self) -> Result<(), ErrorKind> {
         for (name, class) in &self.classes {
             if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_') {
-                return Err(Cause::ClassName(name.clone()));
+                return Err(ErrorKind::ClassName(name.clone()));
             }
             class.check(&format!("classes.{name}"))?;
         }
@@ -284,14 +284,14 @@ impl Model {
     }
 
     /// Returns a class by name.
-    pub(crate) fn class(&self, name: &str) -> Result<&CellClass, Cause> {
+    pub(crate) fn class(&self, name: &str) -> Result<&CellClass, ErrorKind> {
         let known = || self.classes.keys().cloned().collect();
-        self.classes.get(name).ok_or_else(|| Cause::UnknownClass(name.to_owned(), known()))
+        self.classes.get(name).ok_or_else(|| ErrorKind::UnknownClass(name.to_owned(), known()))
     }
 }
 
 impl CellClass {
-    fn check(&self, path: &str) -> Result<(), Cause> {
+    fn check(&self, path: &str) -> Result<(), ErrorKind> {
         let at = |field: &str| format!("{path}.{field}");
         let (cytoplasm, nucleus) = (&self.cytoplasm, &self.nucleus);
         cytoplasm.radius_um.check(&at("cytoplasm.radius_um"), 0.5, 500.0)?;
@@ -328,48 +328,48 @@ impl CellClass {
 }
 
 impl Shapes {
-    fn check(&self, path: &str) -> Result<(), Cause> {
+    fn check(&self, path: &str) -> Result<(), ErrorKind> {
         for (name, statistics) in [("correlated", &self.correlated), ("independent", &self.independent)] {
             let valid = fsd_shape::ShapeModel::from_statistics(statistics.clone());
-            valid.map_err(|error| Cause::Shapes(format!("{path}.{name}"), error))?;
+            valid.map_err(|error| ErrorKind::Shapes(format!("{path}.{name}"), error))?;
         }
         Ok(())
     }
 }
 
 impl Donor {
-    fn check(&self, field: String) -> Result<(), Cause> {
+    fn check(&self, field: String) -> Result<(), ErrorKind> {
         /// Maximum width: twice a nucleus of 100 µm with pixels of 0.05 µm.
         const MAX_WIDTH: usize = 4096;
         within(&format!("{field}.pixel_um"), self.pixel_um, [0.05, 4.0])?;
         let pixels = self.absorbance_milli.len();
         if self.width == 0 || self.width > MAX_WIDTH || !pixels.is_multiple_of(self.width) {
-            return Err(Cause::DonorSize { field, width: self.width, pixels });
+            return Err(ErrorKind::DonorSize { field, width: self.width, pixels });
         }
         if self.absorbance_milli.iter().all(|&v| v == OUTSIDE) {
-            return Err(Cause::EmptyDonor(field));
+            return Err(ErrorKind::EmptyDonor(field));
         }
         Ok(())
     }
 }
 
 impl LogNormal {
-    fn check(&self, path: &str, low: f64, high: f64) -> Result<(), Cause> {
+    fn check(&self, path: &str, low: f64, high: f64) -> Result<(), ErrorKind> {
         within(&format!("{path}.median"), self.median, [low, high])?;
         within(&format!("{path}.log_sd"), self.log_sd, [0.0, 3.0])
     }
 }
 
 impl Normal {
-    fn check(&self, path: &str, low: f64, high: f64) -> Result<(), Cause> {
+    fn check(&self, path: &str, low: f64, high: f64) -> Result<(), ErrorKind> {
         within(&format!("{path}.mean"), self.mean, [low, high])?;
         within(&format!("{path}.sd"), self.sd, [0.0, high])
     }
 }
 
-fn profile(path: &str, values: &[f64]) -> Result<(), Cause> {
+fn profile(path: &str, values: &[f64]) -> Result<(), ErrorKind> {
     if values.is_empty() {
-        return Err(Cause::EmptyProfile(path.to_owned()));
+        return Err(ErrorKind::EmptyProfile(path.to_owned()));
     }
     values.iter().try_for_each(|value| within(path, *value, [0.0, 100.0]))
 }

@@ -11,7 +11,7 @@ use voronoi_cytoskeleton::{DescentPath, Skeleton, SkeletonParams, Torus};
 use super::chromatin::DonorSet;
 use super::noise_fields::NoiseFieldGenerator;
 use super::tile::Point;
-use crate::error::Cause;
+use crate::error::ErrorKind;
 use crate::key::{Key, Stream};
 use crate::model::{CellClass, Model, OutlineForm, Shapes};
 use crate::profile::StageTimer;
@@ -55,7 +55,7 @@ pub(crate) struct ClassAssets {
 }
 
 impl PhantomAssets {
-    pub(crate) fn new(recipe: &Recipe, model: &Model, timer: StageTimer) -> Result<Self, Cause> {
+    pub(crate) fn new(recipe: &Recipe, model: &Model, timer: StageTimer) -> Result<Self, ErrorKind> {
         let mut classes = BTreeMap::new();
         for name in recipe.cells.keys() {
             classes.insert(name.clone(), ClassAssets::new(name, model.class(name)?, recipe)?);
@@ -84,7 +84,7 @@ impl Cytoskeletons {
     }
 
     /// Returns the cytoskeleton lines of one cell inside its outline.
-    pub(crate) fn grow(&self, outline: &[Point], rng: &mut Stream) -> Result<Vec<DescentPath>, Cause> {
+    pub(crate) fn grow(&self, outline: &[Point], rng: &mut Stream) -> Result<Vec<DescentPath>, ErrorKind> {
         let number = random::below(TORI, rng);
         let torus = self.tori[number].get_or_init(|| {
             let mut torus_rng = Key { seed: 0, index: 0 }.stream("studio", number as u64, "torus");
@@ -96,14 +96,14 @@ impl Cytoskeletons {
 }
 
 impl ClassAssets {
-    fn new(name: &str, class: &CellClass, recipe: &Recipe) -> Result<Self, Cause> {
+    fn new(name: &str, class: &CellClass, recipe: &Recipe) -> Result<Self, ErrorKind> {
         let model = |shapes: &Shapes, spread: ShapeSpread| {
             let statistics = match spread {
                 ShapeSpread::Correlated => &shapes.correlated,
                 ShapeSpread::Independent => &shapes.independent,
             };
             ShapeModel::from_statistics(statistics.clone())
-                .map_err(|error| Cause::Shapes(format!("classes.{name}"), error))
+                .map_err(|error| ErrorKind::Shapes(format!("classes.{name}"), error))
         };
         let cytoplasm = model(&class.cytoplasm.shapes, recipe.cytoplasm.shape)?;
         let nucleus = model(&class.nucleus.shapes, recipe.nucleus.shape)?;
@@ -113,13 +113,13 @@ impl ClassAssets {
     }
 
     /// Draws the outline of a cytoplasm with this radius, its long axis along x.
-    pub(crate) fn cytoplasm(&self, radius_px: f64, rng: &mut Stream) -> Result<Descriptors, Cause> {
+    pub(crate) fn cytoplasm(&self, radius_px: f64, rng: &mut Stream) -> Result<Descriptors, ErrorKind> {
         let drawn = self.cytoplasm.draw(radius_px, rng)?;
         Ok(formed(&drawn.descriptors, &self.class.cytoplasm.form, rng))
     }
 
     /// Draws the outline of a nucleus with this radius, its long axis along x.
-    pub(crate) fn nucleus(&self, radius_px: f64, rng: &mut Stream) -> Result<Descriptors, Cause> {
+    pub(crate) fn nucleus(&self, radius_px: f64, rng: &mut Stream) -> Result<Descriptors, ErrorKind> {
         let drawn = self.nucleus.draw(radius_px, rng)?;
         Ok(formed(&drawn.descriptors, &self.class.nucleus.form, rng))
     }

@@ -5,7 +5,7 @@ use quilt_texture::{QuiltParams, Quilter, Source};
 use spectral_field::{FieldParams, Padding, SpectralField, Spectrum};
 
 use super::tile::{Point, Tile};
-use crate::error::Cause;
+use crate::error::ErrorKind;
 use crate::key::{Key, Stream};
 use crate::model::{ChromatinStatistics, Donor, NucleusStatistics, OUTSIDE};
 use crate::random;
@@ -42,14 +42,14 @@ struct ChromatinField {
 
 impl DonorSet {
     /// Creates the donors of a class: learned ones if available, else synthetic ones.
-    pub(crate) fn new(name: &str, nucleus: &NucleusStatistics, shapes: &ShapeModel) -> Result<Self, Cause> {
+    pub(crate) fn new(name: &str, nucleus: &NucleusStatistics, shapes: &ShapeModel) -> Result<Self, ErrorKind> {
         let field = ChromatinField::new(&nucleus.chromatin)?;
         let imaged = !nucleus.donors.is_empty();
         let (sources, pixel_um) = match nucleus.donors.first() {
             Some(first) => {
                 let same = nucleus.donors.iter().all(|d| (d.pixel_um - first.pixel_um).abs() < 1e-6);
                 if !same {
-                    return Err(Cause::DonorPixels(name.to_owned()));
+                    return Err(ErrorKind::DonorPixels(name.to_owned()));
                 }
                 (nucleus.donors.iter().map(learned_source).collect::<Result<Vec<_>, _>>()?, first.pixel_um)
             }
@@ -70,7 +70,7 @@ impl DonorSet {
         donors: usize,
         params: &QuiltParams,
         rng: &mut Stream,
-    ) -> Result<Vec<f32>, Cause> {
+    ) -> Result<Vec<f32>, ErrorKind> {
         let chosen: Vec<&Source> =
             choose(self.sources.len(), donors, rng).into_iter().map(|i| &self.sources[i]).collect();
         let quilter = Quilter::new(&chosen, params)?;
@@ -92,16 +92,16 @@ fn choose(count: usize, wanted: usize, rng: &mut Stream) -> Vec<usize> {
 }
 
 /// Converts a learned donor to a source of patches.
-fn learned_source(donor: &Donor) -> Result<Source, Cause> {
+fn learned_source(donor: &Donor) -> Result<Source, ErrorKind> {
     let mask: Vec<f32> = donor.absorbance_milli.iter().map(|&v| if v == OUTSIDE { 0.0 } else { 1.0 }).collect();
     let mut pixels: Vec<f32> =
         donor.absorbance_milli.iter().map(|&v| if v == OUTSIDE { 0.0 } else { f32::from(v) / 1000.0 }).collect();
     standardise(&mut pixels, &mask);
-    Source::new(&pixels, &mask, donor.width).map_err(Cause::Donor)
+    Source::new(&pixels, &mask, donor.width).map_err(ErrorKind::Donor)
 }
 
 impl ChromatinField {
-    fn new(chromatin: &ChromatinStatistics) -> Result<Self, Cause> {
+    fn new(chromatin: &ChromatinStatistics) -> Result<Self, ErrorKind> {
         /// Width and height of the periodic field, px: larger than any nucleus at the pixel size of synthetic donors.
         const SIDE: usize = 128;
         let spectrum = Spectrum::Matern { nu: chromatin.nu, length_px: chromatin.length_um / SYNTHETIC_PIXEL_UM };
@@ -114,7 +114,13 @@ impl ChromatinField {
     }
 
     /// Draws a synthetic donor: a nucleus shape of the class filled with its field.
-    fn donor(&self, name: &str, index: u64, nucleus: &NucleusStatistics, shapes: &ShapeModel) -> Result<Source, Cause> {
+    fn donor(
+        &self,
+        name: &str,
+        index: u64,
+        nucleus: &NucleusStatistics,
+        shapes: &ShapeModel,
+    ) -> Result<Source, ErrorKind> {
         // Donors are part of the model, so their key does not depend on the image.
         let mut rng = Key { seed: 0, index: 0 }.stream(&format!("donor/{name}"), index, "made");
         let radius = nucleus.radius_um.median * libm::exp(nucleus.radius_um.log_sd * random::normal(&mut rng))

@@ -14,7 +14,7 @@ pub(crate) mod piece;
 pub(crate) mod tile;
 
 use crate::debris::{ObjectContext, add_coat};
-use crate::error::Cause;
+use crate::error::ErrorKind;
 use crate::profile::Stage;
 use crate::scene::{Body, Object, Scene, View};
 
@@ -31,7 +31,7 @@ pub(crate) fn make<'a>(
     scene: &'a Scene,
     noise_fields: &'a NoiseFields<'a>,
     objects: &[&'a Object],
-) -> Result<Vec<Phantom>, Cause> {
+) -> Result<Vec<Phantom>, ErrorKind> {
     let cell = |object: &&'a Object| match &object.body {
         Body::Cell(body) => Some(CellContext { assets, scene, noise_fields, object, body }),
         _ => None,

@@ -8,7 +8,7 @@ use super::chromatin::standardise;
 use super::parametric_shape::{perturbed_circle, placed};
 use super::piece::Piece;
 use super::tile::{Point, Tile, area, scaled_about};
-use crate::error::Cause;
+use crate::error::ErrorKind;
 use crate::key::Stream;
 use crate::random;
 use crate::recipe::Chromatin;
@@ -34,7 +34,7 @@ const WRINKLE: f64 = 0.075;
 const EDGE_TAIL: f64 = 1e-3;
 
 /// Draws the nucleus of a cell.
-pub(super) fn make(cell: &CellContext<'_>, class: &ClassAssets) -> Result<Piece, Cause> {
+pub(super) fn make(cell: &CellContext<'_>, class: &ClassAssets) -> Result<Piece, ErrorKind> {
     let CellContext { assets, scene, object, body, .. } = *cell;
     let nucleus = &body.nucleus;
     let pixel_um = scene.grid().pixel_um;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use rand_core::Rng;
 
-use crate::error::Cause;
+use crate::error::ErrorKind;
 use crate::key::{Key, Stream};
 use crate::model::{CellClass, HaloStatistics, Model};
 use crate::random;
@@ -48,7 +48,7 @@ pub(super) fn draw_cells(
     numbers: &FieldNumbers,
     stain: &FieldStain<'_>,
     crowding: Crowding,
-) -> Result<Cells, Cause> {
+) -> Result<Cells, ErrorKind> {
     let weights = weights(&recipe.layout, given, view, numbers)?;
     let count = |(class, mix): (&String, &CellMix)| {
         numbers.number_of((&format!("cells.{class}.count"), &mix.count), weights.populated_mm2) as usize
@@ -78,7 +78,7 @@ pub(super) fn draw_cells(
             let mut place_rng = numbers.key.stream("cell", number, "place");
             let place = groups.next(cell.body.radius_um, |rng| places.next(in_margin, rng), &mut place_rng);
             let place = match place {
-                Err(Cause::Crowded { .. }) if crowding == Crowding::LeaveOut => break,
+                Err(ErrorKind::Crowded { .. }) if crowding == Crowding::LeaveOut => break,
                 place => place?,
             };
             let depth_um = relief.at(place.centre_um);
@@ -95,7 +95,7 @@ pub(super) fn draw_cells(
 
 /// Returns how many cells of each class to place: those requested, or the same fraction of each class where they do not
 /// fit.
-fn fitting(recipe: &Recipe, places: &Places, requested: &[usize], crowding: Crowding) -> Result<Vec<usize>, Cause> {
+fn fitting(recipe: &Recipe, places: &Places, requested: &[usize], crowding: Crowding) -> Result<Vec<usize>, ErrorKind> {
     /// Fraction of the cells that fit which is placed in a crowded field, so that each class gets places.
     const CROWDED: f64 = 0.9;
     let mut counts = [0; 2];

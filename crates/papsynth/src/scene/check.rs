@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::field::{Object, Scene};
 use crate::debris::{Body, NucleusForm};
-use crate::error::{Cause, Error, within};
+use crate::error::{Error, ErrorKind, within};
 
 /// Largest number of objects, planes and pixels of a scene.
 const MOST_OBJECTS: usize = 1 << 20;
@@ -84,10 +84,10 @@ impl Scene {
     }
 }
 
-fn read(text: &str) -> Result<Scene, Cause> {
-    let mut value: Value = serde_json::from_str(text).map_err(Cause::NotAScene)?;
+fn read(text: &str) -> Result<Scene, ErrorKind> {
+    let mut value: Value = serde_json::from_str(text).map_err(ErrorKind::NotAScene)?;
     let Some(Value::Array(objects)) = value.get_mut("objects").map(Value::take) else {
-        return Err(Cause::NoObjects);
+        return Err(ErrorKind::NoObjects);
     };
     value["objects"] = Value::Array(Vec::new());
     numbers(&value, "", "")?;
@@ -96,33 +96,33 @@ fn read(text: &str) -> Result<Scene, Cause> {
     within("planes_um", scene.planes_um.len() as f64, [1.0, MOST_PLANES as f64])?;
     within("view", (scene.view.width * scene.view.height) as f64, [1.0, MOST_PIXELS as f64])?;
     if scene.frame.is_some() {
-        return Err(Cause::SlideScene);
+        return Err(ErrorKind::SlideScene);
     }
     let farthest_um = FARTHEST_POINTS * scene.grid().pixel_um;
     let mut ids = BTreeSet::new();
     for (index, value) in objects.into_iter().enumerate() {
         let id = value.get("id").cloned().unwrap_or_default();
         let object = object(value, scene.view.pixel_um, farthest_um, &mut ids);
-        scene.objects.push(object.map_err(|cause| Cause::Object { index, id, cause: Box::new(cause) })?);
+        scene.objects.push(object.map_err(|cause| ErrorKind::Object { index, id, cause: Box::new(cause) })?);
     }
     Ok(scene)
 }
 
-fn object(value: Value, pixel_um: f64, farthest_um: f64, ids: &mut BTreeSet<u32>) -> Result<Object, Cause> {
+fn object(value: Value, pixel_um: f64, farthest_um: f64, ids: &mut BTreeSet<u32>) -> Result<Object, ErrorKind> {
     numbers(&value, "", "")?;
     let object: Object = serde_json::from_value(value)?;
     if object.plot.is_some() {
-        return Err(Cause::SlideScene);
+        return Err(ErrorKind::SlideScene);
     }
     if !ids.insert(object.id) {
-        return Err(Cause::SameId);
+        return Err(ErrorKind::SameId);
     }
     let reach_um = object.body.reach_um(pixel_um).max(match &object.body {
         Body::Cell(cell) => 2.0 * cell.nucleus.radius_um.max(cell.halo.map_or(0.0, |halo| halo.radius_um)),
         _ => 0.0,
     });
     if reach_um > farthest_um {
-        return Err(Cause::Reach(reach_um, farthest_um));
+        return Err(ErrorKind::Reach(reach_um, farthest_um));
     }
     // Round leukocytes have no lobes and no cytoplasm.
     if let Body::Leukocyte(cell) = &object.body
@@ -145,7 +145,7 @@ fn range(path: &str, name: &str) -> Option<&'static (&'static str, f64, f64)> {
 }
 
 /// Checks the range of every number, and that no string or boolean is in place of a number.
-fn numbers(value: &Value, path: &str, name: &str) -> Result<(), Cause> {
+fn numbers(value: &Value, path: &str, name: &str) -> Result<(), ErrorKind> {
     match value {
         Value::Object(fields) => fields.iter().try_for_each(|(name, value)| {
             let path = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
@@ -157,7 +157,7 @@ fn numbers(value: &Value, path: &str, name: &str) -> Result<(), Cause> {
             _ => Ok(()),
         },
         Value::String(_) | Value::Bool(_) if range(path, name).is_some() => {
-            Err(Cause::NotANumber(path.to_owned(), value.to_string()))
+            Err(ErrorKind::NotANumber(path.to_owned(), value.to_string()))
         }
         _ => Ok(()),
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::debris::placement::{CellPosition, Field, PlacedObject, PlotDensity};
 use crate::debris::{Body, Debris};
-use crate::error::{Cause, Error};
+use crate::error::{Error, ErrorKind};
 use crate::key::Key;
 use crate::model::Model;
 use crate::random;
@@ -42,8 +42,9 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
         let cells = draw_cells(recipe, model, weight_map, view, &numbers, &stain, crowding)?;
         Ok((attempt, numbers, cells))
     };
-    let is_crowded =
-        |cause: &Cause| matches!(cause, Cause::NoRoom { .. } | Cause::Crowded { .. } | Cause::TooUneven { .. });
+    let is_crowded = |cause: &ErrorKind| {
+        matches!(cause, ErrorKind::NoRoom { .. } | ErrorKind::Crowded { .. } | ErrorKind::TooUneven { .. })
+    };
     let mut drawn = draw_cells(0, Crowding::Error);
     for attempt in 1..MAX_ATTEMPTS {
         if !drawn.as_ref().is_err_and(is_crowded) {
@@ -64,7 +65,7 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
         !abundance.is_some_and(Abundance::is_density) || inside.touches(object.centre_um, reach_um)
     });
     if u32::try_from(objects.len()).is_err() {
-        return Err(fail(Cause::TooManyObjects(objects.len())));
+        return Err(fail(ErrorKind::TooManyObjects(objects.len())));
     }
     for (id, object) in (1_u32..).zip(&mut objects) {
         object.id = id;

@@ -2,7 +2,7 @@
 
 use rand_core::Rng;
 
-use crate::error::Cause;
+use crate::error::ErrorKind;
 use crate::random;
 use crate::recipe::section::named;
 use crate::recipe::{Clusters, Labels, Layout};
@@ -47,7 +47,7 @@ pub(super) fn weights(
     given: Option<&WeightMap>,
     view: View,
     numbers: &FieldNumbers,
-) -> Result<Weights, Cause> {
+) -> Result<Weights, ErrorKind> {
     let field = Region::of(view);
     let pixels = field.size_um.map(|length| random::count((length / PITCH_UM).ceil()).clamp(1, MOST_PIXELS));
     let pitch_um = [0, 1].map(|axis| field.size_um[axis] / pixels[axis] as f64);
@@ -177,20 +177,20 @@ fn nearest_of(clusters: &[[f64; 3]], [width, height]: [usize; 2], size_um: [f64;
 }
 
 /// Checks the file of a layout.
-pub(crate) fn check_layout(layout: &Layout, given: Option<&WeightMap>) -> Result<(), Cause> {
+pub(crate) fn check_layout(layout: &Layout, given: Option<&WeightMap>) -> Result<(), ErrorKind> {
     let (Layout::DensityMap { path } | Layout::Labels(Labels { path, .. })) = layout else { return Ok(()) };
     let map = given.ok_or_else(|| not_given(path, "an image"))?;
-    map.sampler().map(|_| ()).map_err(|cause| Cause::Map { path: path.clone(), cause: Box::new(cause) })
+    map.sampler().map(|_| ()).map_err(|cause| ErrorKind::Map { path: path.clone(), cause: Box::new(cause) })
 }
 
-fn not_given(path: &str, what: &'static str) -> Cause {
-    Cause::NotGiven { path: path.to_owned(), what }
+fn not_given(path: &str, what: &'static str) -> ErrorKind {
+    ErrorKind::NotGiven { path: path.to_owned(), what }
 }
 
 /// Returns a map blurred by a Gaussian, because the centre of a cell may be next to a given label.
-fn smoothed(map: &WeightMap, sigma_px: f64) -> Result<WeightMap, Cause> {
+fn smoothed(map: &WeightMap, sigma_px: f64) -> Result<WeightMap, ErrorKind> {
     map.sampler()?;
-    let kernel = optics_psf::Gaussian::new(sigma_px).map_err(Cause::Smoothing)?;
+    let kernel = optics_psf::Gaussian::new(sigma_px).map_err(ErrorKind::Smoothing)?;
     Ok(WeightMap { width: map.width, weights: kernel.blur(&map.weights, map.width, optics_psf::Border::Reflect) })
 }
 
@@ -205,7 +205,7 @@ pub(super) struct Places {
 }
 
 impl Places {
-    pub(super) fn new(weights: &Weights, spacing_um: f64) -> Result<Self, Cause> {
+    pub(super) fn new(weights: &Weights, spacing_um: f64) -> Result<Self, ErrorKind> {
         let areas = [(weights.of_field.sampler()?, weights.field), (weights.of_region.sampler()?, weights.region)];
         Ok(Self { areas, spacing_um, taken: Vec::new(), squares: std::collections::BTreeMap::new() })
     }
@@ -241,8 +241,8 @@ impl Places {
     }
 
     /// Returns the error about cells that do not fit.
-    pub(super) fn no_room(&self, in_field: usize, in_both: usize) -> Cause {
-        Cause::NoRoom {
+    pub(super) fn no_room(&self, in_field: usize, in_both: usize) -> ErrorKind {
+        ErrorKind::NoRoom {
             count: random::count(self.count_in_field(in_field, in_both)),
             spacing_um: self.spacing_um,
             area_um2: self.area_um2(false),
@@ -251,16 +251,16 @@ impl Places {
     }
 
     /// Checks the expected number of tries.
-    pub(super) fn check_tries(&self, count: usize, in_margin: bool) -> Result<(), Cause> {
+    pub(super) fn check_tries(&self, count: usize, in_margin: bool) -> Result<(), ErrorKind> {
         let tries = self.areas[usize::from(in_margin)].0.expected_tries() * count as f64;
         if tries > MOST_TRIES {
-            return Err(Cause::TooUneven { count, tries, most: MOST_TRIES });
+            return Err(ErrorKind::TooUneven { count, tries, most: MOST_TRIES });
         }
         Ok(())
     }
 
     /// Returns the next place, µm: in the field, or in the field and its margin.
-    pub(super) fn next<R: Rng + ?Sized>(&mut self, in_margin: bool, rng: &mut R) -> Result<[f64; 2], Cause> {
+    pub(super) fn next<R: Rng + ?Sized>(&mut self, in_margin: bool, rng: &mut R) -> Result<[f64; 2], ErrorKind> {
         /// Largest number of accepted candidates that are too near to others.
         const CROWDED: usize = 20_000;
         let mut crowded = 0;
@@ -276,7 +276,7 @@ impl Places {
             }
             crowded += 1;
         }
-        Err(Cause::Crowded { placed: self.taken.len(), spacing_um: self.spacing_um })
+        Err(ErrorKind::Crowded { placed: self.taken.len(), spacing_um: self.spacing_um })
     }
 
     fn square(&self, place: [f64; 2]) -> (i64, i64) {

@@ -18,7 +18,7 @@ use super::groups::Groups;
 use super::stain::FieldStain;
 use super::view::{FieldNumbers, Region, View};
 use crate::debris::placement::{PlotDensity, near};
-use crate::error::Cause;
+use crate::error::ErrorKind;
 use crate::key::Key;
 use crate::model::Model;
 use crate::random;
@@ -105,7 +105,7 @@ impl PlotCache {
 
 impl Population {
     /// Returns the population of the slide with this key, and the scene of the empty slide.
-    pub(crate) fn new(recipe: &Recipe, model: &Model, key: Key) -> Result<(Self, Scene), Cause> {
+    pub(crate) fn new(recipe: &Recipe, model: &Model, key: Key) -> Result<(Self, Scene), ErrorKind> {
         let slide = FieldNumbers { key };
         let stain = FieldStain::of_slide(&recipe.stain, &slide);
         let pixel_um = pixel_um(recipe, &slide);
@@ -149,7 +149,7 @@ impl Population {
     }
 
     /// Prepares the layout.
-    fn place_clusters(&mut self, slide: &FieldNumbers) -> Result<(), Cause> {
+    fn place_clusters(&mut self, slide: &FieldNumbers) -> Result<(), ErrorKind> {
         /// Largest number of plots that a cluster may reach beyond its own.
         const FARTHEST: i64 = 4;
         /// Number of places along a side for the mean weight, and of plots that contain them.
@@ -158,12 +158,12 @@ impl Population {
         let layout = match &self.recipe.layout {
             Layout::Uniform {} => return Ok(()),
             Layout::Clusters(layout) => layout,
-            _ => return Err(Cause::LayoutOfField),
+            _ => return Err(ErrorKind::LayoutOfField),
         };
         let largest = layout.radius_um.bounds()[1];
         let reach = random::count((CLUSTER_REACH * largest / self.side_um()).ceil()) as i64;
         if reach > FARTHEST {
-            return Err(Cause::WideClusters(largest, FARTHEST as f64 * self.side_um() / CLUSTER_REACH));
+            return Err(ErrorKind::WideClusters(largest, FARTHEST as f64 * self.side_um() / CLUSTER_REACH));
         }
         let outside = slide.draw(named!("layout", layout.outside));
         self.places = Places { clusters: Some(layout.clone()), outside, reach, mean: 1.0 };
@@ -262,11 +262,11 @@ impl Population {
     }
 
     /// Returns the objects of a plot, by id. Places are relative to the corner of the plot.
-    pub(crate) fn plot(&self, at: [i64; 2]) -> Result<Arc<Vec<Object>>, Cause> {
+    pub(crate) fn plot(&self, at: [i64; 2]) -> Result<Arc<Vec<Object>>, ErrorKind> {
         self.plots.get(at, || self.draw(at))
     }
 
-    fn draw(&self, at: [i64; 2]) -> Result<Vec<Object>, Cause> {
+    fn draw(&self, at: [i64; 2]) -> Result<Vec<Object>, ErrorKind> {
         let number = number(at);
         let field = FieldNumbers { key: self.key.plot(number) };
         let slide = FieldNumbers { key: self.key };
@@ -295,7 +295,7 @@ impl Population {
         strew(&self.recipe.debris, [region; 2], &field, &stain, Some(plot_density), &mut objects);
         let most = (1 << OBJECT_BITS) - 2;
         if objects.len() > most {
-            return Err(Cause::FullPlot { side_px: PLOT_PX, found: objects.len(), most });
+            return Err(ErrorKind::FullPlot { side_px: PLOT_PX, found: objects.len(), most });
         }
         for (id, object) in (1_u32..).zip(&mut objects) {
             object.id = number << OBJECT_BITS | id;

@@ -2,7 +2,7 @@
 
 use rand_core::Rng;
 
-use crate::error::Cause;
+use crate::error::ErrorKind;
 use crate::random;
 
 /// Relative density of cells at each place of a field, as an image stretched over the field.
@@ -39,17 +39,17 @@ impl WeightMap {
     }
 
     /// Prepares the map for sampling, or returns why it is invalid.
-    pub(crate) fn sampler(&self) -> Result<Sampler, Cause> {
+    pub(crate) fn sampler(&self) -> Result<Sampler, ErrorKind> {
         if self.width == 0 || self.weights.is_empty() || !self.weights.len().is_multiple_of(self.width) {
-            return Err(Cause::MapSize(self.weights.len(), self.width));
+            return Err(ErrorKind::MapSize(self.weights.len(), self.width));
         }
         if let Some(bad) = self.weights.iter().position(|w| !w.is_finite() || *w < 0.0) {
             let (x, y) = (bad % self.width, bad / self.width);
-            return Err(Cause::Weight { x, y, weight: self.weights[bad] });
+            return Err(ErrorKind::Weight { x, y, weight: self.weights[bad] });
         }
         let largest = self.weights.iter().fold(0.0_f32, |a, b| a.max(*b));
         if largest <= 0.0 {
-            return Err(Cause::NoWeight);
+            return Err(ErrorKind::NoWeight);
         }
         let possible = (0_u32..).zip(&self.weights).filter(|(_, w)| **w > 0.0).map(|(i, _)| i).collect();
         Ok(Sampler {

@@ -17,7 +17,7 @@ use super::light::{FocusAt, LightBuffers, Specimen, TransmissionStats};
 use super::object_transmission::{DyeMixer, ObjectTransmission, Window, add, clear};
 use super::overlap::Overlaps;
 use crate::detect::sum_over;
-use crate::error::Cause;
+use crate::error::ErrorKind;
 use crate::phantom::tile::Tile;
 use crate::phantom::{Phantom, Piece};
 use crate::recipe::{Imaging, Mixing, Restore};
@@ -74,12 +74,12 @@ impl BrightFieldPath {
         specimen: Specimen<'_>,
         optics: &SceneMicroscope,
         microscopes: &MicroscopeCache,
-    ) -> Result<Self, Cause> {
+    ) -> Result<Self, ErrorKind> {
         let scene = specimen.scene;
         let groups = light_groups(specimen, optics, microscopes)?;
         let extra_blur = || Gaussian::truncated(optics.extra_blur_um / scene.view.pixel_um, Method::Direct, LOST_TAIL);
         let extra_blur = (optics.extra_blur_um > 0.0).then(extra_blur).transpose();
-        let extra_blur = extra_blur.map_err(|error| Cause::Optics("optics.extra_blur_um", error))?;
+        let extra_blur = extra_blur.map_err(|error| ErrorKind::Optics("optics.extra_blur_um", error))?;
         let imaged = specimen.phantoms.iter().flat_map(|phantom| &phantom.pieces).any(|piece| piece.imaged);
         let restores = scene.restoration.restore != Restore::Off && imaged;
         let feather = || Gaussian::new(scene.restoration.feather_um / scene.grid().pixel_um);
@@ -104,7 +104,7 @@ impl BrightFieldPath {
         specimen: Specimen<'_>,
         focus: FocusAt,
         light: &mut LightBuffers,
-    ) -> Result<TransmissionStats, Cause> {
+    ) -> Result<TransmissionStats, ErrorKind> {
         let View { width, height, .. } = specimen.scene.view;
         let LightBuffers { channels, lights, images, .. } = light;
         let mut stats = TransmissionStats { absorbances: vec![Vec::new(); channels.len()], clipped_px: 0 };
@@ -169,26 +169,31 @@ impl BrightFieldPath {
         group: &LightGroup,
         lights: &mut [optics_psf::TransmittedLight],
         clipped_px: &mut usize,
-    ) -> Result<Vec<Vec<f64>>, Cause> {
+    ) -> Result<Vec<Vec<f64>>, ErrorKind> {
         let mut absorbances = vec![Vec::new(); lights.len()];
         let image = |index: usize| self.image_object(specimen, index, focus, group);
-        threads::each(specimen.threads, specimen.phantoms.len(), image, |index, object_factors: Result<_, Cause>| {
-            let Some(object_factors) = object_factors? else {
-                for absorbances in &mut absorbances {
-                    absorbances.extend(specimen.phantoms[index].pieces.iter().map(|_| 0.0));
+        threads::each(
+            specimen.threads,
+            specimen.phantoms.len(),
+            image,
+            |index, object_factors: Result<_, ErrorKind>| {
+                let Some(object_factors) = object_factors? else {
+                    for absorbances in &mut absorbances {
+                        absorbances.extend(specimen.phantoms[index].pieces.iter().map(|_| 0.0));
+                    }
+                    return Ok(());
+                };
+                let at_px = object_factors.window.origin.map(|at| at / i64::from(self.optics.oversampling));
+                let factors = object_factors.buffers.factors.iter().zip(&object_factors.absorbances);
+                for ((light, absorbances), (factor, own)) in lights.iter_mut().zip(&mut absorbances).zip(factors) {
+                    light.multiply(factor, at_px);
+                    *clipped_px += factor.clipped;
+                    absorbances.extend(own);
                 }
-                return Ok(());
-            };
-            let at_px = object_factors.window.origin.map(|at| at / i64::from(self.optics.oversampling));
-            let factors = object_factors.buffers.factors.iter().zip(&object_factors.absorbances);
-            for ((light, absorbances), (factor, own)) in lights.iter_mut().zip(&mut absorbances).zip(factors) {
-                light.multiply(factor, at_px);
-                *clipped_px += factor.clipped;
-                absorbances.extend(own);
-            }
-            self.free_buffers().push(object_factors.buffers);
-            Ok::<_, Cause>(())
-        })?;
+                self.free_buffers().push(object_factors.buffers);
+                Ok::<_, ErrorKind>(())
+            },
+        )?;
         Ok(absorbances)
     }
 
@@ -203,7 +208,7 @@ impl BrightFieldPath {
     }
 
     /// Returns the blur radius of an object at this depth and stage position, in pixels.
-    pub(super) fn reach_px(&self, depth_um: f64, stage_um: f64) -> Result<usize, Cause> {
+    pub(super) fn reach_px(&self, depth_um: f64, stage_um: f64) -> Result<usize, ErrorKind> {
         let mut widest = 0;
         for light in self.groups.iter().flat_map(|group| &group.lights) {
             widest = widest.max(light.imager.margin_px(depth_um, stage_um - light.shift_um)?);
@@ -218,7 +223,7 @@ impl BrightFieldPath {
         index: usize,
         at: FocusAt,
         group: &LightGroup,
-    ) -> Result<Option<ObjectFactors>, Cause> {
+    ) -> Result<Option<ObjectFactors>, ErrorKind> {
         let (object, phantom) = (&specimen.scene.objects[index], &specimen.phantoms[index]);
         // Depth and stage position.
         let position = |light: &ChannelLight| match at {
@@ -324,7 +329,7 @@ fn abbe_image(
     microscope: &Microscope,
     light: (&DyeMixer, usize),
     stage_um: f64,
-) -> Result<Factor, Cause> {
+) -> Result<Factor, ErrorKind> {
     let View { width, height, pixel_um } = specimen.scene.grid();
     // The grid is periodic: with this margin, light that wraps around does not reach the image.
     let margin = crate::random::count(((reach_um(specimen, microscope, stage_um) + DIFFRACTION_UM) / pixel_um).ceil());
@@ -332,7 +337,7 @@ fn abbe_image(
     let frame = Window { origin: [-(margin as i64); 2], width: size[0], height: size[1] };
     let params =
         AbbeParams { width: size[0], height: size[1], source: Source::Vogel { points: optics.directions as usize } };
-    let abbe = Abbe::new(microscope, &params).map_err(|error| Cause::Optics("optics.directions", error))?;
+    let abbe = Abbe::new(microscope, &params).map_err(|error| ErrorKind::Optics("optics.directions", error))?;
     let layers = layers(specimen, optics.slab_um, light, frame)?;
     let full = abbe.image(&layers, stage_um)?;
     let rows = full.chunks_exact(size[0]).skip(margin).take(height);
@@ -352,7 +357,7 @@ fn layers(
     slab_um: f64,
     (mixer, light): (&DyeMixer, usize),
     frame: Window,
-) -> Result<Vec<Layer>, Cause> {
+) -> Result<Vec<Layer>, ErrorKind> {
     let mut slabs: BTreeMap<i64, Vec<[f64; 2]>> = BTreeMap::new();
     let mut transmission = ObjectTransmission::default();
     for (object, phantom) in specimen.scene.objects.iter().zip(specimen.phantoms) {

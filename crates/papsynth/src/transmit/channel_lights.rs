@@ -6,7 +6,7 @@ use optics_psf::{Microscope, MicroscopeParams, PatchImager, Zernike};
 
 use super::light::Specimen;
 use super::object_transmission::DyeMixer;
-use crate::error::Cause;
+use crate::error::ErrorKind;
 use crate::recipe::Mixing;
 use crate::scene::{SceneLight, SceneMicroscope};
 use crate::threads;
@@ -33,7 +33,7 @@ pub(super) fn light_groups(
     specimen: Specimen<'_>,
     optics: &SceneMicroscope,
     microscopes: &MicroscopeCache,
-) -> Result<Vec<LightGroup>, Cause> {
+) -> Result<Vec<LightGroup>, ErrorKind> {
     let scene = specimen.scene;
     let params = |wavelength_um: f64, bandwidth_um: f64| MicroscopeParams {
         na: optics.na,
@@ -86,7 +86,7 @@ pub(super) fn light_groups(
             let own = |channel: usize| (0..channels.len()).map(|c| if c == channel { 1.0 } else { 0.0 }).collect();
             let lights = channels.iter().enumerate();
             let lights = lights.map(|(c, of)| light(of.wavelength_um, of.bandwidth_um, own(c)));
-            let lights = lights.collect::<Result<_, Cause>>()?;
+            let lights = lights.collect::<Result<_, ErrorKind>>()?;
             Ok(vec![group(DyeMixer::Colour(Box::new(colour)), lights)])
         }
     }
@@ -107,7 +107,7 @@ pub(crate) struct MicroscopeCache {
 
 impl MicroscopeCache {
     /// Returns the microscope with these parameters.
-    fn get(&self, params: &MicroscopeParams) -> Result<Arc<PatchImager>, Cause> {
+    fn get(&self, params: &MicroscopeParams) -> Result<Arc<PatchImager>, ErrorKind> {
         let mut cached = self.cached.lock().unwrap_or_else(PoisonError::into_inner);
         let imager = match cached.iter().position(|imager| imager.microscope().params() == params) {
             Some(at) => cached.remove(at),

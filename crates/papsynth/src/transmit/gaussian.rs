@@ -8,7 +8,7 @@ use optics_psf::{Gaussian, Method, Scratch};
 use super::light::{FocusAt, LightBuffers, Specimen, TransmissionStats};
 use super::object_transmission::{Window, add, blurred_tile};
 use crate::detect::sum_over;
-use crate::error::Cause;
+use crate::error::ErrorKind;
 use crate::phantom::piece::Piece;
 use crate::phantom::tile::Tile;
 use crate::scene::SceneLight;
@@ -53,12 +53,12 @@ struct Blurred<'a> {
 }
 
 impl GaussianPath {
-    pub(super) fn new(specimen: Specimen<'_>, sigma_xy_um: f64, sigma_z_um_per_um: f64) -> Result<Self, Cause> {
+    pub(super) fn new(specimen: Specimen<'_>, sigma_xy_um: f64, sigma_z_um_per_um: f64) -> Result<Self, ErrorKind> {
         let view = specimen.scene.view;
         let in_plane = Gaussian::truncated(sigma_xy_um / view.pixel_um, Method::Direct, LOST_TAIL_IN_PLANE)?;
         let wavelength_um = match specimen.scene.light {
             SceneLight::Monochrome { wavelength_um, .. } => wavelength_um,
-            SceneLight::Colour { .. } => return Err(Cause::ColourWithGaussians),
+            SceneLight::Colour { .. } => return Err(ErrorKind::ColourWithGaussians),
         };
         let px_per_um = sigma_z_um_per_um / view.pixel_um;
         let frame = Window { origin: [0, 0], width: view.width, height: view.height };
@@ -71,7 +71,7 @@ impl GaussianPath {
         specimen: Specimen<'_>,
         focus: FocusAt,
         light: &mut LightBuffers,
-    ) -> Result<TransmissionStats, Cause> {
+    ) -> Result<TransmissionStats, ErrorKind> {
         let mut absorbances = Vec::new();
         let blur = |index: usize| {
             let defocus_um = match focus {
@@ -87,7 +87,7 @@ impl GaussianPath {
             Ok(pieces.map(|piece| self.blur_piece(piece, gaussian.as_ref())).collect::<Vec<_>>())
         };
         // Eq. 14: I_p = Σ pᵢ ∗ G_σz, in the order of the objects.
-        threads::each(specimen.threads, specimen.phantoms.len(), blur, |_, pieces: Result<_, Cause>| {
+        threads::each(specimen.threads, specimen.phantoms.len(), blur, |_, pieces: Result<_, ErrorKind>| {
             for piece in pieces? {
                 absorbances.push(piece.mean * f64::from(piece.strength));
                 let Some(tile) = piece.tile else { continue };
@@ -96,7 +96,7 @@ impl GaussianPath {
                     self.free_buffers().tiles.push(tile.values);
                 }
             }
-            Ok::<_, Cause>(())
+            Ok::<_, ErrorKind>(())
         })?;
         Ok(TransmissionStats { absorbances: vec![absorbances], clipped_px: 0 })
     }
@@ -125,7 +125,7 @@ impl GaussianPath {
     }
 
     /// Returns the blur of an object at this defocus; `None` if it is negligible.
-    pub(super) fn blur(&self, defocus_um: f64) -> Result<Option<Gaussian>, Cause> {
+    pub(super) fn blur(&self, defocus_um: f64) -> Result<Option<Gaussian>, ErrorKind> {
         let sigma_px = self.px_per_um * defocus_um.abs();
         let gaussian = (sigma_px > SHARP_PX).then(|| Gaussian::truncated(sigma_px, Method::Decimated, LOST_TAIL));
         Ok(gaussian.transpose()?)

@@ -3,7 +3,7 @@
 use perlin_bg::{Background, BackgroundParams, BackgroundTexture, FractalParams, Illumination};
 use rand_core::Rng;
 
-use crate::error::Cause;
+use crate::error::ErrorKind;
 use crate::phantom::Phantom;
 use crate::scene::{Scene, SceneIllumination};
 use crate::threads::Threads;
@@ -53,7 +53,7 @@ pub(crate) struct TransmissionStats {
 
 impl LightBuffers {
     /// Computes the light of the empty slide of a scene.
-    pub(crate) fn prepare(&mut self, scene: &Scene) -> Result<(), Cause> {
+    pub(crate) fn prepare(&mut self, scene: &Scene) -> Result<(), ErrorKind> {
         let view = scene.view;
         self.empty_log10.resize(view.width * view.height, 0.0);
         background(scene)?.log10_into(&mut self.empty_log10, view.width, [0, 0]);
@@ -63,7 +63,7 @@ impl LightBuffers {
 }
 
 /// Returns the background of a scene (Eqs. 8–10), in fractions of full scale.
-fn background(scene: &Scene) -> Result<Background, Cause> {
+fn background(scene: &Scene) -> Result<Background, ErrorKind> {
     let view = scene.view;
     let illumination = match scene.background.illumination {
         SceneIllumination::Border { exponent } => Illumination::BorderDistance { exponent },

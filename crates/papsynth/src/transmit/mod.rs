@@ -14,7 +14,7 @@ mod overlap;
 use optics_psf::{Border, Gaussian};
 use portable_numerics::elementary::exp10_from;
 
-use crate::error::Cause;
+use crate::error::ErrorKind;
 use crate::scene::{Scene, SceneOptics, View};
 
 use bright_field::BrightFieldPath;
@@ -42,7 +42,7 @@ pub(crate) enum LightPath {
 }
 
 impl LightPath {
-    pub(crate) fn new(specimen: Specimen<'_>, microscopes: &MicroscopeCache) -> Result<Self, Cause> {
+    pub(crate) fn new(specimen: Specimen<'_>, microscopes: &MicroscopeCache) -> Result<Self, ErrorKind> {
         Ok(match &specimen.scene.optics {
             SceneOptics::Gaussian { sigma_xy_um, sigma_z_um_per_um } => {
                 Self::Gaussian(Box::new(GaussianPath::new(specimen, *sigma_xy_um, *sigma_z_um_per_um)?))
@@ -59,7 +59,7 @@ impl LightPath {
         specimen: Specimen<'_>,
         focus: FocusAt,
         light: &mut LightBuffers,
-    ) -> Result<TransmissionStats, Cause> {
+    ) -> Result<TransmissionStats, ErrorKind> {
         let View { width, height, .. } = specimen.scene.view;
         light.channels.iter_mut().for_each(|channel| clear(channel, width * height));
         match self {
@@ -114,7 +114,7 @@ impl LightPath {
     }
 
     /// Returns the largest blur radius, over all planes of the scene, of an object at this depth, in pixels.
-    pub(crate) fn object_blur_radius_px(&self, scene: &Scene, depth_um: f64) -> Result<usize, Cause> {
+    pub(crate) fn object_blur_radius_px(&self, scene: &Scene, depth_um: f64) -> Result<usize, ErrorKind> {
         let mut widest = 0;
         for &plane_um in &scene.planes_um {
             let seen_at_um = scene.seen_at_um(plane_um, depth_um);

@@ -12,7 +12,7 @@ use optics_psf::{Gaussian, Method, Scratch};
 
 use super::light::Specimen;
 use super::object_transmission::{Window, add, blurred_tile};
-use crate::error::Cause;
+use crate::error::ErrorKind;
 use crate::phantom::piece::Phantom;
 use crate::phantom::tile::{Tile, overlay};
 use crate::scene::{Scene, View};
@@ -85,7 +85,7 @@ impl Overlaps {
         specimen: Specimen<'_>,
         blur_px: impl Fn(usize) -> f64 + Sync + Send,
         channels: &mut [Vec<f32>],
-    ) -> Result<(), Cause> {
+    ) -> Result<(), ErrorKind> {
         if self.objects.len() < 2 {
             return Ok(());
         }
@@ -125,7 +125,7 @@ impl Overlaps {
 }
 
 impl OverlappingObject {
-    fn dyes(&self, colour: &Colour, phantom: &Phantom, blur_px: f64) -> Result<ObjectDyes, Cause> {
+    fn dyes(&self, colour: &Colour, phantom: &Phantom, blur_px: f64) -> Result<ObjectDyes, ErrorKind> {
         let blurred;
         let pieces = if blur_px > SHARP_PX {
             let gaussian = Gaussian::truncated(blur_px, Method::Decimated, LOST_TAIL)?;

@@ -17,7 +17,7 @@ use parquet::schema::types::Type;
 
 use super::features::{CLASS, IMAGE, metadata, yaml};
 use super::writer::{Writer, failed};
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 use crate::files::Pending;
 use crate::formats::depth::{Depth, to_training};
 use crate::formats::names::{HUGGINGFACE_CARD, IMAGE as FILE, PLANES, huggingface_file, huggingface_split, numbered};
@@ -207,7 +207,7 @@ pub(crate) fn images(path: &Path, image: &str) -> Result<Vec<Vec<u8>>, Error> {
         None => None,
     };
     found.ok_or_else(|| {
-        Error::input(path)(Problem::broken("Parquet", format!("the file has no image `{}`", image.escape_default())))
+        Error::input(path)(InputError::broken("Parquet", format!("the file has no image `{}`", image.escape_default())))
     })
 }
 

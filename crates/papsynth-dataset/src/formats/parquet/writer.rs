@@ -12,7 +12,7 @@ use parquet::file::properties::{EnabledStatistics, WriterProperties, WriterVersi
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::types::{SchemaDescriptor, Type, TypePtr};
 
-use crate::error::{Error, Problem};
+use crate::error::{Error, InputError};
 use crate::truth::{Cell, Head, Kind};
 
 /// Size of a row group: approximate bytes in memory, and rows.
@@ -259,9 +259,9 @@ pub(super) fn failed(action: &'static str, path: &Path) -> impl Fn(ParquetError)
     move |error| match error {
         ParquetError::External(inner) => match inner.downcast::<io::Error>() {
             Ok(error) => Error::io(action, path)(*error),
-            Err(other) => Error::input(path)(Problem::broken("Parquet", other)),
+            Err(other) => Error::input(path)(InputError::broken("Parquet", other)),
         },
-        other => Error::input(path)(Problem::broken("Parquet", other)),
+        other => Error::input(path)(InputError::broken("Parquet", other)),
     }
 }
 

@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 use voronoi_cytoskeleton::{LineParams, draw_into};
 
-use crate::error::Cause;
+use crate::error::ErrorKind;
 use crate::key::Stream;
 use crate::phantom::cell_context::CellContext;
 use crate::phantom::noise_fields::{FieldSampler, SIDE, Texels};
@@ -82,7 +82,7 @@ pub(super) fn add_cytoskeleton(
     outline: &[Point],
     cell: &CellContext<'_>,
     rng: &mut Stream,
-) -> Result<(), Cause> {
+) -> Result<(), ErrorKind> {
     /// Width of a fibre, µm.
     const FIBRE_UM: f64 = 0.3;
     let strength = cell.body.detail.cytoskeleton;

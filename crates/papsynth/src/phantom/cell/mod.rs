@@ -6,7 +6,7 @@ mod detail;
 mod outline;
 mod wrinkles;
 
-use crate::error::Cause;
+use crate::error::ErrorKind;
 use crate::key::Stream;
 use crate::phantom::assets::{ClassAssets, PhantomAssets};
 use crate::phantom::cell_context::CellContext;
@@ -29,7 +29,7 @@ const SKEW: f64 = 0.45;
 const RIM_STEP_UM: f64 = 0.375;
 
 /// Draws cells; sheets are simulated in batches.
-pub(super) fn make(assets: &PhantomAssets, cells: &[CellContext<'_>]) -> Result<Vec<Phantom>, Cause> {
+pub(super) fn make(assets: &PhantomAssets, cells: &[CellContext<'_>]) -> Result<Vec<Phantom>, ErrorKind> {
     let plans = cells.iter().map(CellPlan::new).collect::<Result<Vec<_>, _>>()?;
     let sheets = assets.timer.time(Stage::Sheets, || crumple(assets, cells, &plans))?;
     let finished = |((cell, plan), sheet): ((&CellContext<'_>, CellPlan), Option<Sheet>)| finish(cell, plan, sheet);
@@ -46,9 +46,9 @@ struct CellPlan<'a> {
 }
 
 impl<'a> CellPlan<'a> {
-    fn new(cell: &CellContext<'a>) -> Result<Self, Cause> {
+    fn new(cell: &CellContext<'a>) -> Result<Self, ErrorKind> {
         let CellContext { assets, scene, object, body, .. } = *cell;
-        let class = assets.classes.get(&body.class).ok_or_else(|| Cause::ForeignClass(body.class.clone()))?;
+        let class = assets.classes.get(&body.class).ok_or_else(|| ErrorKind::ForeignClass(body.class.clone()))?;
         let centre = scene.sheet_grid().to_px(object.centre_um);
         let outline = assets.timer.time(Stage::Outlines, || outline(cell, class, centre))?;
         let nucleus = assets.timer.time(Stage::Nuclei, || nucleus::make(cell, class))?;
@@ -58,7 +58,7 @@ impl<'a> CellPlan<'a> {
 }
 
 /// Draws the outline of a cell before its rim is roughened.
-fn outline(cell: &CellContext<'_>, class: &ClassAssets, centre: Point) -> Result<Vec<Point>, Cause> {
+fn outline(cell: &CellContext<'_>, class: &ClassAssets, centre: Point) -> Result<Vec<Point>, ErrorKind> {
     let mut rng = cell.stream("outline");
     let radius_px = cell.body.radius_um / cell.pixel_um();
     let formed = class.cytoplasm(radius_px, &mut rng)?;
@@ -109,7 +109,11 @@ fn creases(cell: &CellContext<'_>, fold: Fold, outline: &[Point], centre: Point)
     }
 }
 
-fn crumple(assets: &PhantomAssets, cells: &[CellContext<'_>], plans: &[CellPlan]) -> Result<Vec<Option<Sheet>>, Cause> {
+fn crumple(
+    assets: &PhantomAssets,
+    cells: &[CellContext<'_>],
+    plans: &[CellPlan],
+) -> Result<Vec<Option<Sheet>>, ErrorKind> {
     let Some(cloth) = &assets.cloth else { return Ok(plans.iter().map(|_| None).collect()) };
     let jobs = cells.iter().zip(plans);
     let jobs = jobs.map(|(cell, plan)| SheetSpec { outline: &plan.outline, area_ratio: cell.body.detail.excess_area });
@@ -121,7 +125,7 @@ fn crumple(assets: &PhantomAssets, cells: &[CellContext<'_>], plans: &[CellPlan]
 /// Folds the sheet of a cell and computes its absorbance along the light path (Eq. 12): A = κ·c·l.
 ///
 /// l is the thickness of the sheet and κ·c the absorbance of the cytoplasm.
-fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Result<Phantom, Cause> {
+fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Result<Phantom, ErrorKind> {
     let CellContext { scene, body, .. } = *cell;
     let mut rng = cell.stream("detail");
     let pixel_um = cell.pixel_um();
