@@ -279,7 +279,7 @@ mod tests {
         let recipe = load(Preset::Lbc, &["layout.kind=uniform", "slide.depth_um={ normal = [4, 0.5] }"]).unwrap();
         assert_eq!(recipe.layout, Layout::Uniform {});
         assert_eq!(recipe.slide.depth_um, Number::normal(4.0, 0.5));
-        for count in ["20", "{ uniform = [1, 4] }", "{ per_mm2 = 120 }", "{ per_mm2 = { uniform = [1, 4] } }"] {
+        for count in ["20", "{ uniform = [1.5, 4.5] }", "{ per_mm2 = 120 }", "{ per_mm2 = { uniform = [1.5, 4.5] } }"] {
             let sets = [format!("cells.intermediate.count={count}")];
             for preset in [Preset::Lbc, Preset::Paper2015] {
                 let recipe = load(preset, &[&sets[0]]).unwrap();
@@ -303,13 +303,13 @@ mod tests {
             ("field.widht_px=96", "did you mean `width_px`"),
             ("field.width_px=-3", "field.width_px: -3 is out of range: expected 16 to 32768"),
             ("field.width_px=nan", "field.width_px: NaN"),
-            ("field.width_px=wide", "is a text"),
+            ("field.width_px=wide", "expected a number, found a string"),
             ("field.width_px", "expected FIELD=VALUE"),
             ("field.width_px=", "--set"),
             ("=3", "--set"),
             ("field.width_px=[1,", "--set"),
             ("field=3", "field: expected a table, found an integer"),
-            ("layout.kind=map", "missing field"),
+            ("layout.kind=density-map", "missing field"),
             ("camera.bits=8.5", "is not an integer"),
             ("layout.kind=lumps", "layout.kind: unknown value \"lumps\""),
             ("version=2", "version 2"),

@@ -212,8 +212,8 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
     type Spread = fn(f64, &Number) -> Number;
     let mut single: Vec<(P, &mut Number, Spread)> = vec![
         (P::BackgroundTexture, &mut r.background.texture, about),
-        (P::NoiseCorrelationX, &mut r.focus.noise_correlation_x, |value, _| number(value)),
-        (P::NoiseCorrelationY, &mut r.focus.noise_correlation_y, |value, _| number(value)),
+        (P::NoiseCorrelationX, &mut r.focus.noise_correlation_x, |value, _| number(value.clamp(0.0, 0.5))),
+        (P::NoiseCorrelationY, &mut r.focus.noise_correlation_y, |value, _| number(value.clamp(0.0, 0.5))),
         (P::Depth, &mut r.slide.depth_um, |value, _| number(value)),
         (P::Dome, &mut r.nucleus.dome, |value, _| within(value, 0.2)),
         (P::Rim, &mut r.nucleus.rim, |value, _| Number::uniform(0.0, rounded(2.0 * value))),

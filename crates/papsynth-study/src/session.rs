@@ -397,7 +397,7 @@ mod tests {
         open(&scratch, &other).unwrap();
         drop(session);
         let error = open(&scratch, &StudyParams { trials: 8, seed: 1, ..params() }).unwrap_err().to_string();
-        assert!(error.contains("seed is 1, expected 0, trials is 8, expected 6"), "{error}");
+        assert!(error.contains("trials is 8, expected 6, seed is 1, expected 0"), "{error}");
         assert_eq!(read_all(&scratch.join("out")).unwrap().len(), 2);
     }
 

@@ -93,7 +93,7 @@ pub enum ErrorKind {
     #[error("not a model of papsynth: expected a JSON object")]
     NotATable,
     /// A model of another version, and the accepted version.
-    #[error("version {0} is not supported: this program reads version {1}")]
+    #[error("version is {0}; expected {1}")]
     ModelVersion(String, u32),
     /// A field of a model or of a scene has a wrong type, is missing, or is unknown.
     #[error(transparent)]

@@ -364,7 +364,7 @@ fn invalid_flats_are_rejected() {
         write_grey16(bench.path("tiny/dark").join(name), &[100; 12 * 12], 12);
         write_grey16(bench.path("tiny").join(name), &[900; 12 * 12], 12);
     }
-    rejected(&bench, "--flat tiny --bits 12", &["12 x 12 pixels", "more than 15 pixels"]);
+    rejected(&bench, "--flat tiny --bits 12", &["12 x 12 pixels", "more than 15 in each direction"]);
 }
 
 #[test]

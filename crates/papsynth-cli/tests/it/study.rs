@@ -38,7 +38,7 @@ fn invalid_input_of_a_study_has_exit_code_2() {
         ("study real synthetic --json", "cannot be used with"),
         ("study --json", "--results"),
         ("study real synthetic --patch-px 300", "real: found 0 of "),
-        ("study real synthetic --trials 10000 --patch-px 64", "are needed"),
+        ("study real synthetic --trials 10000 --patch-px 64", "use more or larger fields"),
         ("study --results real", "there is no study in it"),
         ("study --results missing", "missing"),
         ("study real synthetic --results results", "cannot be used with"),
@@ -58,7 +58,7 @@ fn a_study_prints_its_address_and_continues_after_an_interrupt() {
     assert_eq!(first.code, 130, "{}", first.err);
     assert!(first.out.contains("http://127.0.0.1:"), "{}", first.out);
     assert!(
-        first.err.contains("real: 3 of 25 fields") && first.err.contains("run the same command again"),
+        first.err.contains("real: found 3 of 25 fields") && first.err.contains("run the same command again"),
         "{}",
         first.err
     );
@@ -67,7 +67,7 @@ fn a_study_prints_its_address_and_continues_after_an_interrupt() {
     assert_eq!(address(&first.out), address(&second.out), "an open page reconnects");
     let other = bench.run("study real synthetic --trials 6 --patch-px 64");
     assert_eq!(other.code, 2);
-    assert!(other.err.contains("trials was 4 and is 6 now"), "{}", other.err);
+    assert!(other.err.contains("trials is 6, expected 4"), "{}", other.err);
     let pooled = bench.run("study --results results");
     assert_eq!(pooled.code, 2);
     assert!(pooled.err.contains("none of 1 studies is finished"), "{}", pooled.err);

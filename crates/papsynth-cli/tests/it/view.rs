@@ -14,7 +14,7 @@ fn invalid_input_of_a_view_has_exit_code_2() {
     let slide = if cfg!(feature = "zarr") { "slide.json" } else { "--features zarr" };
     for (words, named) in [
         ("view", "DIR"),
-        ("view missing", "there is no such folder"),
+        ("view missing", "no such folder"),
         ("view empty", "neither a data set nor a slide"),
         ("view slide", slide),
         ("view empty --port 0", "--port"),
@@ -46,9 +46,9 @@ fn the_server_runs_until_ctrl_c() {
     let mut answer = String::new();
     stream.read_to_string(&mut answer).unwrap();
     let info: serde_json::Value = serde_json::from_str(answer.split("\r\n\r\n").nth(1).unwrap()).unwrap();
-    assert_eq!((&info["title"], &info["pictures"]), (&"set".into(), &2.into()), "{info}");
+    assert_eq!((&info["title"], &info["images"]), (&"set".into(), &2.into()), "{info}");
     let taken = bench.run(&format!("view set --port {port}"));
-    assert!(taken.code == 2 && taken.err.contains(&format!("port {port}")), "{}", taken.err);
+    assert!(taken.code == 2 && taken.err.contains(&format!("127.0.0.1:{port}")), "{}", taken.err);
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     assert_eq!(child.wait().unwrap().code(), Some(0));
 }

@@ -254,7 +254,7 @@ fn folders_of_nuclei_are_paired_by_name() {
     put("images/.DS_Store", b"");
     put("images/notes.txt", b"");
     put("masks/b.tif", &tiff::<colortype::Gray8>(&[0, 1, 1, 0], [2, 2], 1));
-    fails("images: the folder has no PNG, JPEG or TIFF file");
+    fails("images: contains no PNG, JPEG or TIFF file");
     put("images/b.png", &grey_png(&[9, 8, 7, 6], 2));
     put("images/a.png", &grey_png(&[1, 2, 3, 4], 2));
     fails("a.png: there is no mask of the same name");

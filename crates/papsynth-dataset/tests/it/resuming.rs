@@ -73,7 +73,7 @@ fn a_folder_with_other_files_is_refused_and_unchanged() {
     let scratch = Scratch::new("stranger");
     fs::write(scratch.join("thesis.tex"), "years of work").unwrap();
     refused(open(scratch.path()), "thesis.tex");
-    refused(open(&scratch.join("thesis.tex")), "is a file");
+    refused(open(&scratch.join("thesis.tex")), "expected a folder, found a file");
     assert_eq!(contents(scratch.path()), [("thesis.tex".to_owned(), b"years of work".to_vec())]);
     fs::write(scratch.join("manifest.json"), "{}").unwrap();
     refused(open(scratch.path()), "manifest.json");
@@ -242,7 +242,7 @@ fn the_bytes_do_not_depend_on_the_split_into_runs() {
         stop: &AtomicBool::new(false),
         profile: None,
     };
-    assert!(stranger.generate(&engine, &run, &|_| ()).unwrap_err().to_string().contains("another recipe"));
+    assert!(stranger.generate(&engine, &run, &|_| ()).unwrap_err().to_string().contains("recipe"));
 }
 
 #[test]

@@ -175,7 +175,8 @@ fn parameters_of_held_out_recipes_are_recovered() {
     let regression = Regression::new(&table.statistics, &table.places);
     let explained = |parameter: Parameter| regression.explained()[sought.iter().position(|p| *p == parameter).unwrap()];
     for parameter in [Parameter::Cells, Parameter::Blur] {
-        assert!(explained(parameter) > 0.4, "{parameter:?}: {}", explained(parameter));
+        // With a density, the number of cells in a field varies for the same recipe.
+        assert!(explained(parameter) > 0.3, "{parameter:?}: {}", explained(parameter));
     }
 
     let drawn = unseen(TRIALS, SEED);

@@ -118,7 +118,7 @@ fn replies_have_the_security_headers() {
 fn it_listens_on_loopback_only_and_reports_a_port_in_use() {
     let server = Server::bind(0).unwrap();
     let error = Server::bind(server.port()).unwrap_err();
-    assert!(error.to_string().contains(&format!("127.0.0.1, port {}", server.port())), "{error}");
+    assert!(error.to_string().contains(&format!("127.0.0.1:{}", server.port())), "{error}");
     // A previous port that is in use is not an error.
     assert_ne!(Server::bind_near(server.port()).unwrap().port(), server.port());
     // The server does not listen on other addresses such as 127.0.0.2.

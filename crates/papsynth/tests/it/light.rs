@@ -407,7 +407,7 @@ fn invalid_apertures_are_reported_with_their_field() {
     assert!(recipe.problems().is_empty());
     assert!(recipe.notes()[0].to_string().contains("37 % of the light"), "{:?}", recipe.notes());
     let text = problems(&|recipe| recipe.field.magnification = 0.5.into());
-    assert!(text.contains("field.magnification: 0.5 does not make pixels of 0.05 to 4 µm"), "{text}");
+    assert!(text.contains("field.magnification: 0.5 gives a pixel size outside 0.05 to 4 µm"), "{text}");
 }
 
 #[test]
