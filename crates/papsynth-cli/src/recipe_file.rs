@@ -188,7 +188,7 @@ impl Set {
             ExitError::from(ErrorReport::new(message).at("--set", &text, span).help(help))
         };
         let Some((key, value)) = argument.split_once('=') else {
-            return Err(wrong("expected FIELD=VALUE", 0..argument.len()));
+            return Err(wrong("expected KEY=VALUE", 0..argument.len()));
         };
         let value_at = key.len() + 1;
         // A bare word is a string, so that a shell needs no quotes.
@@ -304,7 +304,7 @@ mod tests {
             ("field.width_px=-3", "field.width_px: -3 is out of range: expected 16 to 32768"),
             ("field.width_px=nan", "field.width_px: NaN"),
             ("field.width_px=wide", "is a text"),
-            ("field.width_px", "expected FIELD=VALUE"),
+            ("field.width_px", "expected KEY=VALUE"),
             ("field.width_px=", "--set"),
             ("=3", "--set"),
             ("field.width_px=[1,", "--set"),

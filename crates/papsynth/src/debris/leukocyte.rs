@@ -49,7 +49,7 @@ section! {
     }
 }
 
-/// A white blood cell with its drawn numbers.
+/// A leukocyte with its drawn numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Leukocyte {
