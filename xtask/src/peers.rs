@@ -54,7 +54,7 @@ pub(crate) fn run(workspace: &Workspace, Peers { only, repetitions, record }: &P
         lines.push((row, race.row(row)?));
     }
     println!("\nProcess CPU time on one thread, medians of alternating measurements:\n\n{}", table::text(&lines));
-    println!("Rows of two cores are wall time. Both draw exact Poisson deviates for shot noise.");
+    println!("Rows of two cores are wall time. Both draw exact Poisson deviates for photon noise.");
     race.notes.iter().for_each(|note| println!("{note}"));
     match missing {
         Some(reason) => Err(reason),

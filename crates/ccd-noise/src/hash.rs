@@ -14,7 +14,7 @@ const SPREAD: u32 = 0x9e37_79b9;
 /// Purpose of a random word.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Stream {
-    /// Radius and angle of the pair of normal deviates: one for shot noise, one for read noise.
+    /// Radius and angle of the pair of normal deviates: one for photon noise, one for read noise.
     Radius,
     Angle,
     /// Acceptance test of a proposed count.
@@ -72,7 +72,7 @@ impl Block<'_> {
         words
     }
 
-    /// Returns two standard normal deviates per pixel: one for shot noise, one for read noise.
+    /// Returns two standard normal deviates per pixel: one for photon noise, one for read noise.
     #[inline(always)]
     pub(crate) fn normal_pairs(&self) -> [[f32; BLOCK]; 2] {
         self.normal_pairs_of(Stream::Radius, Stream::Angle)

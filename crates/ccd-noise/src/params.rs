@@ -1,6 +1,6 @@
 use crate::error::{Error, require, within};
 
-/// Model of photon shot noise: g_po of Eq. 13.
+/// Model of photon noise (shot noise): g_po of Eq. 13.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum PhotonNoise {
     /// A Poisson deviate, exact at every mean.
@@ -12,7 +12,7 @@ pub enum PhotonNoise {
         /// The smallest mean that uses the normal deviate, in electrons, >= 0.
         mean_e: f64,
     },
-    /// No shot noise: each pixel holds its mean. Read noise remains.
+    /// No photon noise: each pixel holds its mean. Read noise remains.
     Off,
 }
 
@@ -120,7 +120,7 @@ pub struct CameraParams {
     pub offset_dn: f64,
     /// Bit depth of the converter, 8 to 16. Default 8, the paper's.
     pub bit_depth: u32,
-    /// Model of photon shot noise. Default exact, the paper's.
+    /// Model of photon noise. Default exact, the paper's.
     pub photon_noise: PhotonNoise,
 }
 

@@ -9,7 +9,7 @@ use crate::lane_plane::{LanePlans, LaneScratch};
 use crate::microscope::distance;
 use crate::{Error, Microscope, Transfer};
 
-/// Images a slide patch by patch: each patch is at one depth and gives a transmission factor of the light around it.
+/// Renders a slide patch by patch: each patch is at one depth and gives a transmission factor of the light around it.
 #[derive(Debug)]
 pub struct PatchImager {
     transfers: TransferCache,

@@ -66,7 +66,7 @@ impl Edge {
     }
 
     /// Returns the distance of each pixel of the window from the edge, positive on the light side, and its grey level.
-    /// The position of the edge minimizes the residuals.
+    /// The position of the edge minimises the residuals.
     ///
     /// # Panics
     /// If the window extends beyond the image.

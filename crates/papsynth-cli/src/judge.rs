@@ -20,7 +20,7 @@ use crate::report::Bar;
 use crate::setup::pool;
 use crate::words::counted;
 
-/// Output files, and the beginnings by which older ones are recognized.
+/// Output files, and the beginnings by which older ones are recognised.
 const PAGE: (&str, Kind) = (
     "report.html",
     Kind::Text(

@@ -13,7 +13,7 @@ use crate::report::Bar;
 use crate::setup::{pool, read_model};
 use crate::words::counted;
 
-/// Output files, and the beginnings by which older ones are recognized.
+/// Output files, and the beginnings by which older ones are recognised.
 const RECIPE: Kind = Kind::Text(b"# Matched to ", "a recipe of papsynth match");
 const REPORT: Kind = Kind::Text(b"{\n  \"match_report\":", "a report of papsynth match");
 

@@ -9,14 +9,14 @@ use png::{BitDepth, ColorType, Compression, Decoder, Encoder, Filter, PixelDimen
 
 use crate::exit::ExitError;
 
-/// Keyword and beginning of the PNG text chunk by which images of papsynth are recognized.
+/// Keyword and beginning of the PNG text chunk by which images of papsynth are recognised.
 const SOFTWARE: &str = "Software";
 const PAPSYNTH: &str = "papsynth ";
 
-/// A kind of output, and how an older output of the kind is recognized.
+/// A kind of output, and how an older output of the kind is recognised.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Kind {
-    /// A recipe of `papsynth init`, which the user edits: never recognized.
+    /// A recipe of `papsynth init`, which the user edits: never recognised.
     Recipe,
     /// A PNG with the text chunk `Software: papsynth …`.
     Image,
@@ -199,7 +199,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn image_paths_papsynth_are_recognized_by_their_text_chunk() {
+    fn image_paths_papsynth_are_recognised_by_their_text_chunk() {
         let path = std::env::temp_dir().join(format!("papsynth-output-file-{}.png", std::process::id()));
         let check = |force| OutputFile::check(&path, Kind::Image, force);
         assert!(check(false).is_ok(), "no file");

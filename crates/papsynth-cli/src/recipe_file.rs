@@ -188,7 +188,7 @@ impl Set {
             ExitError::from(ErrorReport::new(message).at("--set", &text, span).help(help))
         };
         let Some((key, value)) = argument.split_once('=') else {
-            return Err(wrong("expected FIELD=VALUE", 0..argument.len()));
+            return Err(wrong("expected KEY=VALUE", 0..argument.len()));
         };
         let value_at = key.len() + 1;
         // A bare word is a string, so that a shell needs no quotes.
@@ -304,14 +304,14 @@ mod tests {
             ("field.width_px=-3", "field.width_px: -3 is out of range: expected 16 to 32768"),
             ("field.width_px=nan", "field.width_px: NaN"),
             ("field.width_px=wide", "expected a number, found a string"),
-            ("field.width_px", "expected FIELD=VALUE"),
+            ("field.width_px", "expected KEY=VALUE"),
             ("field.width_px=", "--set"),
             ("=3", "--set"),
             ("field.width_px=[1,", "--set"),
             ("field=3", "field: expected a table, found an integer"),
             ("layout.kind=density-map", "missing field"),
             ("camera.bits=8.5", "is not an integer"),
-            ("layout.kind=lumps", "layout.kind: unknown value \"lumps\""),
+            ("layout.kind=lumps", "layout.kind: unknown value"),
             ("version=2", "version 2"),
             ("cytoplasm.sheet=xpdb", "did you mean `xpbd`"),
         ] {

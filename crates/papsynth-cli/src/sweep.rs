@@ -34,7 +34,7 @@ pub(crate) fn run(args: &Sweep) -> Result<(), ExitError> {
         if axes[..number].iter().any(|before| before.field == axis.field) {
             return Err(ExitError::with_help(
                 format!("--vary {}: given twice", axis.field),
-                "give all values of a field in one option: --vary FIELD=A,B,…",
+                "give all values of a parameter in one option: --vary KEY=A,B,…",
             ));
         }
     }
@@ -112,7 +112,7 @@ fn set_name(number: usize) -> String {
 }
 
 fn axis(text: &str) -> Result<Axis, ExitError> {
-    let wrong = || ExitError::input(format!("--vary {text}: expected FIELD=A,B,…"));
+    let wrong = || ExitError::input(format!("--vary {text}: expected KEY=A,B,…"));
     let (field, values) = text.split_once('=').ok_or_else(wrong)?;
     let values = parts(values);
     if field.trim().is_empty() || values.iter().any(String::is_empty) {

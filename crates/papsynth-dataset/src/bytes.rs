@@ -1,4 +1,4 @@
-//! JSON serialization and SHA-256.
+//! JSON serialisation and SHA-256.
 
 use std::fs::File;
 use std::io::{self, BufReader};

@@ -99,7 +99,8 @@ pub struct Report {
     pub fields: [Vec<String>; 2],
     /// Warnings: the same image on both sides, too few objects, ….
     pub warnings: Vec<String>,
-    /// Distinguishable if any test concludes that. One test errs in about 1 of 20 comparisons, this conclusion in 1 of 8.
+    /// Distinguishable if any test concludes that. One test is wrong in about 1 of 20 comparisons, this
+    /// conclusion in 1 of 8.
     pub conclusion: Conclusion,
     /// Classifier tests on nuclei, cells and patches, then on the nuclei of each group that both sides have.
     pub two_sample: Vec<Test<TwoSample>>,

@@ -19,8 +19,8 @@ use crate::error::{self, wrong};
 /// Attributes
 /// ----------
 /// image : ndarray
-///     (height, width), or (height, width, 3) in colour; uint8, or uint16 for more than 8 bits. The extended depth of field of a
-///     stack.
+///     (height, width), or (height, width, 3) in colour; uint8, or uint16 for more than 8 bits. For a stack, the
+///     all-in-focus image.
 /// stack : ndarray
 ///     (planes, height, width[, 3]), the same type; one plane for an image.
 /// noise_free : ndarray
@@ -349,8 +349,8 @@ fn text(py: Python<'_>, values: Vec<String>) -> PyResult<Py<PyAny>> {
 /// Version of the pickled form.
 const PICKLED: u32 = 1;
 
-/// Id, group, kind, class, Bethesda category, traits; cluster, centre, depth, absorbance, tint, rotation, area, truncated; masks;
-/// defocus and detectability.
+/// Id, group, kind, class, Bethesda category, traits; cluster, centre, depth, absorbance, tint, rotation, area,
+/// truncated; masks; defocus and detectability.
 type PickledObject = (
     (u32, String, String, String, String, String),
     (u32, [f64; 2], f64, f64, String, f64, f64, bool),

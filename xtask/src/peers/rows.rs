@@ -102,7 +102,7 @@ pub(super) const ROWS: [Row; 19] = [
     kernel("blur-0.9", "Gaussian blur of a frame, sigma 0.9", "OpenCV", 0.9, 0.45),
     kernel("blur-3.6", "Gaussian blur of a frame, sigma 3.6", "OpenCV", 0.8, 0.4),
     kernel("blur-20", "Gaussian blur of a frame, sigma 20", "OpenCV", 0.1, 0.03),
-    kernel("noise", "shot and read noise of a frame, exact Poisson", "NumPy", 1.0 / 9.0, 1.0 / 14.0),
+    kernel("noise", "photon and read noise of a frame, exact Poisson", "NumPy", 1.0 / 9.0, 1.0 / 14.0),
     kernel("nucleus", "texture of a nucleus of 40 x 40, three sources", NUMBA, 1.0 / 15.0, 1.0 / 29.0),
     kernel("cytoskeleton", "cytoskeleton of a cell", "papsim, SciPy", 1.0 / 13.0, 1.0 / 25.0),
     kernel("perlin", "octave of Perlin noise of a frame", "FastNoiseLite", 1.0 / 9.0, 1.0 / 45.0),

@@ -23,7 +23,7 @@ Examples:
   papsynth preview calibration/optics.toml
 
 Images are grey PNG or TIFF files, ordered by the numbers in their names. The planes of a stack have
-equal distances and lie on both sides of focus; the folder holds no other images. Without --window,
+equal distances and are on both sides of focus; the folder holds no other images. Without --window,
 nuclei are found automatically as dark, compact, sharp objects, and the fit uses their medians.
 Without --step-um, distances are in planes; without --pixel-um, blur is in pixels. Such values are
 not written to recipes.
@@ -49,8 +49,8 @@ pub(crate) struct Calibrate {
     /// Image of a sharp straight edge in focus
     #[arg(long, value_name = "FILE")]
     pub(crate) edge: Option<PathBuf>,
-    /// Line across or along the edge, in pixels; the square of its length around its centre is measured [default: found
-    /// automatically]
+    /// Two points of a line through the edge, in pixels. The measured region is a square centred on the line, as long
+    /// as the line [default: found automatically]
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = parse_line, requires = "edge", allow_hyphen_values = true)]
     pub(crate) line: Option<[f64; 4]>,
     /// Folder of flat frames: a subfolder per level, or pairs of files

@@ -94,7 +94,7 @@ pub(crate) struct Preview {
 /// Render one scene, which may have been edited or written by another program.
 ///
 /// `papsynth generate --scenes` writes the scene of each frame as JSON. An unchanged scene with the same recipe and
-/// model gives the same pixels. The image of a focus stack is the one with every object in focus.
+/// model gives the same pixels. For a focus stack, the PNG shows the all-in-focus image.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

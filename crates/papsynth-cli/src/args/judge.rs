@@ -26,9 +26,9 @@ of 8 or 16 bits; of colour images the green channel is used. A folder may also h
   NAME.csv     points in the nuclei of NAME.png, one `y,x` per line
   masks/       masks or label images of nuclei, with the names of the images
   frames.csv   the group of each image, with the columns `frame,grade`
-Nuclei come from masks if all fields of both sides have them, else from points if all fields have
-points or masks, else they are found automatically: always in the same way on both sides. If pixel
-sizes differ, the side with smaller pixels is averaged to the larger size. The page shows parts of
+Nuclei come from masks if all fields of both folders have them, else from points if all fields have
+points or masks, else they are found automatically: always in the same way in both folders. If pixel
+sizes differ, the images with smaller pixels are averaged to the larger size. The page shows parts of
 the images.")]
 pub(crate) struct Judge {
     /// Folder with 2 or more real fields
@@ -40,13 +40,15 @@ pub(crate) struct Judge {
     /// Output folder; replaces an older report in it, but no other file
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
-    /// Pixel size of the real fields, in micrometres [default: as recorded, else that of the other side]
+    /// Pixel size of the real fields, in micrometres [default: as recorded in the data set, else that of the
+    /// other folder]
     #[arg(long, value_name = "UM", value_parser = parse_pixel)]
     pub(crate) pixel_um: Option<f64>,
-    /// Pixel size of the synthetic fields, in micrometres [default: as recorded, else that of the other side]
+    /// Pixel size of the synthetic fields, in micrometres [default: as recorded in the data set, else that of the
+    /// other folder]
     #[arg(long, value_name = "UM", value_parser = parse_pixel)]
     pub(crate) synthetic_pixel_um: Option<f64>,
-    /// Use only fields of this group, on each side with groups; repeatable
+    /// Use only fields of this group, in folders that have groups; repeatable
     #[arg(long, value_name = "NAME")]
     pub(crate) group: Vec<String>,
     /// Source of nuclei [default: masks if all fields have them, else points, else search]
@@ -68,8 +70,8 @@ pub(crate) struct Judge {
 
 /// Find the recipe whose fields resemble real ones.
 ///
-/// Light and noise are measured. All other parameters are estimated by simulation: random recipes are imaged,
-/// regressions predict parameters from statistics of fields, and a search minimizes the distance to the real fields.
+/// Light and noise are measured. All other parameters are estimated by simulation: random recipes are rendered,
+/// regressions predict parameters from statistics of fields, and a search minimises the distance to the real fields.
 /// Every value has a 95 % interval. Parameters that the fields do not determine are listed and keep their values.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -107,10 +109,10 @@ pub(crate) struct Match {
     /// Use only fields of this group; repeatable
     #[arg(long, value_name = "NAME")]
     pub(crate) group: Vec<String>,
-    /// Number of simulated windows of 640 x 480 pixels, which take most of the time [default: 2000]
+    /// Number of simulated fields of 640 x 480 pixels, which take most of the time [default: 2000]
     #[arg(long, value_name = "N", value_parser = integer(60, 1_000_000_usize), conflicts_with = "quick")]
     pub(crate) simulations: Option<usize>,
-    /// Use a sixth of the simulations: wider intervals, fewer parameters
+    /// Use a sixth of the simulations and fewer search rounds: wider intervals, fewer parameters
     #[arg(long)]
     pub(crate) quick: bool,
     /// Model of `papsynth learn`, or class file (TOML), in addition to the built-in classes

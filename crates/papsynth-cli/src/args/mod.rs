@@ -206,7 +206,7 @@ pub(crate) fn check_addresses(verb: &Verb, words: impl IntoIterator<Item = OsStr
     match words.into_iter().find(|word| Location::is_address(Path::new(word))) {
         Some(word) => {
             let message = format!("{}: expected a folder or a file", Path::new(&word).display());
-            let help = "generate, status, merge, verify and clean work on object stores";
+            let help = "generate, status, merge, verify, clean and submit accept object stores";
             Err(ExitError::with_help(message, help))
         }
         None => Ok(()),

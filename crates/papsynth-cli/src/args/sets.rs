@@ -17,8 +17,8 @@ pub(crate) fn check_of(verify: bool) -> Check {
 /// Check every file of a data set.
 ///
 /// Finds changed, truncated, missing and untracked files, missing frames, and masks, boxes, areas, tables and label
-/// images that contradict each other. Computes the merged files again and compares them. To repair frames, run
-/// `papsynth generate --verify` with the same recipe.
+/// images that contradict each other. Computes the files that cover all frames, such as coco.json, again and compares
+/// them. To repair frames, run `papsynth generate --verify` with the same recipe.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -98,12 +98,13 @@ pub(crate) struct Status {
     /// Print only the missing shards, as numbers and ranges for `sbatch --array`
     #[arg(long)]
     pub(crate) missing: bool,
-    /// Print the tasks with missing shards instead, of N tasks in total (`--task I/N`)
+    /// Print the numbers of the tasks that have missing shards, if the work is divided into N tasks (`--task I/N`)
     #[arg(long, value_name = "N", requires = "missing", value_parser = integer(1, u64::MAX))]
     pub(crate) tasks: Option<u64>,
 }
 
-/// Finish a data set of several tasks: check that all frames are present, and write the files about all frames.
+/// Finish a data set of several tasks: check that all frames are present, and write the files that cover all frames,
+/// such as coco.json.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  papsynth merge fields --frames 100000")]
 pub(crate) struct Merge {
@@ -173,7 +174,7 @@ pub(crate) struct Submit {
     pub(crate) arguments: Vec<String>,
 }
 
-/// Image the scenes of a data set with another microscope, camera, light, focus, stain or background.
+/// Render the scenes of a data set with another microscope, camera, light, focus, stain or background.
 ///
 /// The objects do not change: the masks of both data sets are compared, and a difference is an error.
 #[derive(Debug, Args)]
@@ -195,8 +196,8 @@ pub(crate) struct Rerender {
     /// Built-in camera that replaces the camera of the recipe
     #[arg(long, value_name = "NAME", value_parser = camera_parser())]
     pub(crate) camera: Option<CameraPreset>,
-    /// Set one field of the recipe; repeatable, the last value counts
-    #[arg(long, value_name = "FIELD=VALUE", allow_hyphen_values = true)]
+    /// Set one parameter of the recipe; repeatable, the last value counts
+    #[arg(long, value_name = "KEY=VALUE", allow_hyphen_values = true)]
     pub(crate) set: Vec<String>,
     #[command(flatten)]
     pub(crate) layout: LayoutArgs,
@@ -219,7 +220,7 @@ Examples:
   papsynth sweep mine.toml --out sweep --frames 20 --vary debris.bacilli.clusters=0,8,32 \\
       --vary camera.full_well_e=2000,18000
   papsynth sweep --out sweep --frames 4 --vary stain.slide_nucleus=0.5,1,2 \\
-      --vary background.illumination.x2=0,0.1,0.3")]
+      --vary background.illumination.falloff_x=0,0.1,0.3")]
 pub(crate) struct Sweep {
     #[command(flatten)]
     pub(crate) engine: EngineArgs,
@@ -229,8 +230,8 @@ pub(crate) struct Sweep {
     /// Number of frames of each combination
     #[arg(long, value_name = "N", value_parser = integer(1, u64::MAX))]
     pub(crate) frames: u64,
-    /// Field of the recipe and its values; repeatable, all combinations are generated
-    #[arg(long, value_name = "FIELD=A,B,…", required = true, allow_hyphen_values = true)]
+    /// Parameter of the recipe and its values; repeatable, all combinations are generated
+    #[arg(long, value_name = "KEY=A,B,…", required = true, allow_hyphen_values = true)]
     pub(crate) vary: Vec<String>,
     #[command(flatten)]
     pub(crate) layout: LayoutArgs,

@@ -26,8 +26,8 @@ pub(crate) struct RecipeArgs {
     /// Built-in camera that replaces the camera of the recipe
     #[arg(long, value_name = "NAME", value_parser = camera_parser())]
     pub(crate) camera: Option<CameraPreset>,
-    /// Set one field of the recipe; repeatable, the last value counts
-    #[arg(long, value_name = "FIELD=VALUE", allow_hyphen_values = true)]
+    /// Set one parameter of the recipe; repeatable, the last value counts
+    #[arg(long, value_name = "KEY=VALUE", allow_hyphen_values = true)]
     pub(crate) set: Vec<String>,
 }
 
@@ -39,7 +39,7 @@ pub(crate) struct EngineArgs {
     /// Model of `papsynth learn`, or class file (TOML), in addition to the built-in classes
     #[arg(long, value_name = "FILE")]
     pub(crate) model: Option<PathBuf>,
-    /// Seed of the data set; with the same seed, recipes generate equal objects where they agree
+    /// Seed of the data set. Recipes with the same seed generate the same objects, except where their parameters differ
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = integer(0, u64::MAX))]
     pub(crate) seed: u64,
     /// Number of threads; does not change the output [default: the number of cores]
@@ -78,7 +78,8 @@ pub(crate) struct LayoutArgs {
 /// Files of a data set, for all formats.
 #[derive(Debug, Args)]
 pub(crate) struct FileArgs {
-    /// Label of a pixel with several objects, in formats with one label per pixel
+    /// Label of a pixel with several objects, in formats with one label per pixel: top (nearest to the objective), drop
+    /// (background) or max (largest id)
     #[arg(long, value_name = "POLICY", value_parser = named(Flatten::ALL, Flatten::name), default_value = Flatten::Top.name())]
     pub(crate) flatten: Flatten,
     /// Frames per shard, the group of frames that is written or repaired together [default: 1; 256 with webdataset and

@@ -11,8 +11,8 @@ use crate::task::TaskArgs;
 
 /// Generate slides, which may be larger than memory, and regions of slides.
 ///
-/// `[scan]` of a recipe sets the size of a slide and the position of its deposit. Counts of cells and debris hold for a
-/// field in the full deposit.
+/// `[scan]` of a recipe sets the size of a slide and the position of its deposit. A number of cells or debris per field
+/// is that of a field completely inside the deposit.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -39,7 +39,7 @@ pub(crate) enum SlideVerb {
     /// Finish a slide of several tasks: check that all shards are present, and write lower resolutions, thumbnail and
     /// card.
     Finalize(SlideFinalize),
-    /// Write a region of a slide as a PNG; of several planes the centre one.
+    /// Write a region of a slide as a PNG. If the recipe has several planes, the PNG shows the central one.
     Tile(SlideTile),
 }
 
@@ -62,7 +62,7 @@ pub(crate) struct SlideMake {
     /// Width and height, px [default: scan.width_px and scan.height_px of the recipe]
     #[arg(long, value_name = "W,H", value_parser = parse_pair)]
     pub(crate) size: Option<[u32; 2]>,
-    /// Side of a shard, the square that is written or repaired together, px
+    /// Width and height of a shard, the square region that is written or repaired together, px
     #[arg(long, value_name = "PX", default_value = "4096", value_parser = ["512", "1024", "2048", "4096", "8192"])]
     pub(crate) shard_px: String,
     /// Write tables of objects as CSV only, without Parquet

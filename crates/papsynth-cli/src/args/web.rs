@@ -46,7 +46,7 @@ pub(crate) struct Study {
     /// Name of the subject: letters, digits, `-`, `_` and `.`
     #[arg(long, value_name = "NAME", default_value_t = StudyParams::default().subject)]
     pub(crate) subject: String,
-    /// Design of a trial: one patch, real or not (as in the paper), or two patches, which is real
+    /// Design of a trial: yes-no (is this patch real? as in the paper) or 2afc (which of two patches is real?)
     #[arg(long, value_name = "NAME", value_parser = named(TrialDesign::ALL, TrialDesign::name), default_value = StudyParams::default().task.name())]
     pub(crate) design: TrialDesign,
     /// Number of scored trials
@@ -61,16 +61,17 @@ pub(crate) struct Study {
     /// Standard deviation of the noise added to every pixel, in grey levels
     #[arg(long, value_name = "DN", default_value_t = StudyParams::default().noise_dn)]
     pub(crate) noise: f64,
-    /// Side of a patch, in pixels
+    /// Width and height of a patch, in pixels
     #[arg(long, value_name = "PX", default_value_t = StudyParams::default().patch_px)]
     pub(crate) patch_px: usize,
-    /// Number of fields of each side, chosen at random
+    /// Number of fields used from each folder, chosen at random
     #[arg(long, value_name = "N", default_value_t = StudyParams::default().fields)]
     pub(crate) fields: usize,
     /// Seed of fields, patches, order and noise
     #[arg(long, value_name = "N", default_value_t = StudyParams::default().seed, value_parser = integer(0, u64::MAX))]
     pub(crate) seed: u64,
-    /// Conversion of grey levels to 8 bits, equal on both sides
+    /// Conversion of grey levels to 8 bits in both folders: as-is (scaled by bit depth) or glass (each field scaled to
+    /// equal background brightness)
     #[arg(long, value_name = "NAME", value_parser = named(Grey::ALL, Grey::name), default_value = StudyParams::default().grey.name())]
     pub(crate) grey: Grey,
     /// Pixel size of the real images, in micrometres

@@ -17,7 +17,7 @@ use crate::output_file::{Kind, check_folder};
 
 const RECORD: &str = "calibration.json";
 
-/// Output files, and the beginnings by which older ones are recognized.
+/// Output files, and the beginnings by which older ones are recognised.
 const PLOT: Kind = Kind::Text(plot::BEGINS, "a plot of papsynth calibrate");
 const RECIPE: Kind = Kind::Text(RECIPE_PREFIX, "a recipe of papsynth calibrate");
 const FILES: [(&str, Kind); 7] = [

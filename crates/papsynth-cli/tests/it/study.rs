@@ -39,7 +39,7 @@ fn invalid_input_of_a_study_has_exit_code_2() {
         ("study --json", "--results"),
         ("study real synthetic --patch-px 300", "real: found 0 of "),
         ("study real synthetic --trials 10000 --patch-px 64", "use more or larger fields"),
-        ("study --results real", "there is no study in it"),
+        ("study --results real", "contains no study"),
         ("study --results missing", "missing"),
         ("study real synthetic --results results", "cannot be used with"),
     ] {

@@ -94,12 +94,12 @@ impl Format {
         match self {
             Self::Folder => ("folder", "PNG images (stacks: OME-TIFF), noise-free images and label TIFFs in folders"),
             Self::Webdataset => ("webdataset", "tar shards for streaming: 8-bit image and ground truth of each frame"),
-            Self::OmeTiff => ("ome-tiff", "OME-TIFF (large images: pyramids), with label layers without overlap"),
+            Self::OmeTiff => ("ome-tiff", "OME-TIFF (large images: pyramids), with label images without overlap"),
             Self::Cellpose => ("cellpose", "8-bit images and _masks, for cytoplasm and for nuclei"),
             Self::Stardist => ("stardist", "8-bit images/ and masks/, for cytoplasm and for nuclei"),
             Self::YoloSeg => ("yolo-seg", "8-bit images/ and labels/ (polygons) by split, and data.yaml"),
             Self::Qupath => ("qupath", "OME-TIFF images, and GeoJSON with nuclei within cells"),
-            Self::OmeZarr => ("ome-zarr", "OME-Zarr 0.5 (large images: pyramids), with label layers without overlap"),
+            Self::OmeZarr => ("ome-zarr", "OME-Zarr 0.5 (large images: pyramids), with label images without overlap"),
             Self::Huggingface => {
                 ("huggingface", "Parquet shards by split for `datasets`: 8-bit images, objects with masks")
             }

@@ -127,7 +127,8 @@ impl Layout {
         formats.min_by_key(|format| (format.needs().is_some(), format.depth()))
     }
 
-    /// Returns the path of the all-in-focus image of a stack, and its format; one with the bit depth of the camera if there is one.
+    /// Returns the path of the all-in-focus image of a stack, and its format. Formats with the bit depth of the camera
+    /// are preferred.
     pub(crate) fn edf_image(&self, seed: u64, shard: u64, frame: &FrameSummary) -> Option<(String, Format)> {
         let images = self.formats.iter().filter_map(|format| match format.has_planes() {
             true => Some((format.all_in_focus(seed, shard, frame)?, *format)),

@@ -25,7 +25,8 @@ pub struct Request<'a> {
 }
 
 impl Request<'_> {
-    /// Parses the body as JSON. The content type must be JSON: browsers do not let pages of other sites send it without asking.
+    /// Parses the body as JSON. The content type must be JSON: browsers do not let pages of other sites send it without
+    /// asking.
     ///
     /// # Errors
     /// The reply for a body of another type, a body that is too long, or invalid JSON.

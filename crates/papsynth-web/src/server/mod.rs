@@ -112,7 +112,8 @@ impl Server {
         format!("http://127.0.0.1:{}/", self.port)
     }
 
-    /// Serves a site until `stop` is set. Calls `poll` with the site at least ten times a second, and once more when `stop` is set.
+    /// Serves a site until `stop` is set. Calls `poll` with the site at least ten times a second, and once more when
+    /// `stop` is set.
     ///
     /// # Errors
     /// If the runtime or the socket fails.

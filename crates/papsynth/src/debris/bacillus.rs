@@ -1,9 +1,9 @@
-//! Rod-shaped bacteria ("Bacilli"): short bent rods with round ends, some in chains.
+//! Rod-shaped bacteria (paper, section "Bacilli"): short bent rods with round ends, some in chains.
 
 use super::prelude::*;
 
 section! {
-    /// Rod-shaped bacteria ("Bacilli"), such as lactobacilli.
+    /// Rod-shaped bacteria (paper, section "Bacilli"), such as lactobacilli.
     pub struct Bacilli, drawn from rng as pub Bacillus {
         /// Number of clusters; drawn once per field.
         clusters: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(45.0, 0.8)), 0..=100000, "per field or per mm²";

@@ -1,4 +1,4 @@
-//! White blood cells ("White blood cells", Eqs. 6, 7, Fig. 9): neutrophils, or the paper's round cells.
+//! Leukocytes: neutrophils, or the paper's round cells (paper, section "White blood cells", Eqs. 6, 7, Fig. 9).
 
 mod neutrophil;
 mod round;
@@ -16,7 +16,7 @@ section! {
 }
 
 section! {
-    /// White blood cells ("White blood cells", Eqs. 6, 7, Fig. 9).
+    /// Leukocytes (paper, section "White blood cells", Eqs. 6, 7, Fig. 9).
     pub struct Leukocytes {
         /// Number of clusters; drawn once per field.
         clusters: Abundance = Abundance::per_mm2(Number::log_normal(27.0, 1.0)), 0..=100000, "per field or per mm²";
@@ -49,7 +49,7 @@ section! {
     }
 }
 
-/// A white blood cell with its drawn numbers.
+/// A leukocyte with its drawn numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Leukocyte {

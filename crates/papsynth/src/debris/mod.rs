@@ -1,4 +1,4 @@
-//! Objects other than epithelial cells ("Debris Object Generation").
+//! Objects other than epithelial cells (paper, section "Debris Object Generation").
 //!
 //! Each kind of object has one file with its section of the recipe, the accepted ranges, and the numbers drawn for each
 //! object. `draw` places the objects of a field, `reach_um` returns the maximum radius of an object for a pixel size,
@@ -213,7 +213,7 @@ macro_rules! kinds {
 
 // Section of the recipe, its key for the number of objects, and the drawn type.
 kinds! {
-    /// White blood cells, single and in clusters.
+    /// Leukocytes, single and in clusters.
     leukocytes: Leukocytes { clusters } => Leukocyte(Leukocyte), "leukocyte";
     /// Rod-shaped bacteria, in clusters, on cells and between them.
     bacilli: Bacilli { clusters } => Bacillus(Bacillus), "bacillus";

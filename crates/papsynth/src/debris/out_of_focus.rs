@@ -1,9 +1,10 @@
-//! Objects far outside the depth of the specimen ("Out of focus objects"), with the shape and texture of leukocytes.
+//! Objects far outside the depth of the specimen (paper, section "Out of focus objects"), with the shape and texture of
+//! leukocytes.
 
 use super::prelude::*;
 
 section! {
-    /// Objects far outside the depth of the specimen ("Out of focus objects").
+    /// Objects far outside the depth of the specimen (paper, section "Out of focus objects").
     pub struct OutOfFocus, drawn from rng as pub Blob {
         /// Number of objects; drawn once per field.
         count: Abundance (undrawn) = Abundance::per_mm2(Number::uniform(0.0, 34.0)), 0..=100000, "per field or per mm²";

@@ -1,4 +1,4 @@
-//! Specks of dust and stain ("Speckles"): two adjacent pixels in a random direction, dilated.
+//! Specks of dust and stain: two adjacent pixels in a random direction, dilated (paper, section "Speckles").
 
 use super::prelude::*;
 
@@ -13,7 +13,7 @@ section! {
 }
 
 section! {
-    /// Specks of dust and stain ("Speckles").
+    /// Specks of dust and stain (paper, section "Speckles").
     pub struct Speckles, drawn from rng as pub Speckle {
         /// Number of speckles; drawn once per field.
         count: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(67.0, 0.7)), 0..=1000000, "per field or per mm²";

@@ -1,4 +1,4 @@
-//! The texture of nuclei: donors and their patches ("Texture synthesis", Figs. 4, 5).
+//! The texture of nuclei: donors and their patches (paper, section "Texture synthesis", Figs. 4, 5).
 
 use fsd_shape::ShapeModel;
 use quilt_texture::{QuiltParams, Quilter, Source};

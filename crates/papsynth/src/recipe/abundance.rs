@@ -14,14 +14,14 @@ use super::section::{Bounds, Declared, Part, Value};
 /// The abundance of objects: a count per field, or a density per mm².
 ///
 /// ```toml
-/// count = 30                                  # 30 in each field, whatever its size
+/// count = 30                                  # 30 in each field of any size
 /// count = { uniform = [20, 40] }              # 20 to 40 in each field
 /// count = { per_mm2 = 180 }                   # 180 per mm²
 /// count = { per_mm2 = { uniform = [90, 270] } }
 /// ```
 ///
-/// A count is drawn once a field and rounded to the nearest integer. A density is drawn once a field, multiplied by the
-/// area, and rounded up or down at random, so that the mean is exact.
+/// A count is drawn once per field and rounded to the nearest integer. A density is drawn once per field, multiplied by
+/// the area, and rounded up or down at random, so that the mean is exact.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Abundance {
     /// Objects per field, for a field of any size.

@@ -49,12 +49,13 @@ section! {
         pixel_um: Number (undrawn) = 6.45, 1..=100, "µm";
         /// Bit depth of grey levels.
         bits: Count = 8, 8..=16;
-        /// Full-well capacity, which corresponds to the largest grey level.
+        /// Signal, above the offset, at the largest grey level. Sets the gain. The full-well capacity is slightly
+        /// larger.
         full_well_e: Number = 32_600.0, 10..=10000000;
         /// Standard deviation of the read noise. If pixels differ, its median over pixels.
         read_noise_e: Number = 138.0, 0..=100000, "electrons";
-        /// Root mean square of the read noise over pixels, for pixels that differ as in CMOS: `read_noise_e` to 20
-        /// times that value. 0 if all pixels have the same read noise.
+        /// Root mean square over pixels of the read noise, for pixels that differ, as in CMOS: 0 (all pixels equal), or
+        /// 1 to 20 times `read_noise_e`.
         read_noise_rms_e: Number = 0.0, 0..=100000, "electrons";
         /// Grey level of a dark pixel.
         offset_dn: Number = 0.0, 0..=4096;
@@ -83,7 +84,7 @@ section! {
         blooming: Number = 0.0, 0..=1;
         /// Fraction of the blooming charge that stays in its column.
         blooming_vertical: Number = 0.95, 0..=1;
-        /// Binning factor: pixels of the sensor along the side of an image pixel.
+        /// Binning factor: number of sensor pixels per image pixel in x and in y.
         binning_px: Count = 1, 1..=8;
         /// Binning mode.
         binning: Binning = Binning::Charge;
@@ -97,7 +98,7 @@ section! {
 words! {
     /// A built-in camera.
     pub enum CameraPreset {
-        /// The paper's simulator: 8 bits, 70 electrons a grey level, read noise of one grey level.
+        /// The paper's simulator: 8 bits, 70 electrons per grey level, read noise of one grey level.
         Paper = "paper",
         /// The paper's camera, a cooled interline CCD of 12 bits.
         Orca05g = "orca-05g",
@@ -111,7 +112,7 @@ impl CameraPreset {
     #[must_use]
     pub fn summary(self) -> &'static str {
         match self {
-            Self::Paper => "the paper's simulator: 8 bits, 70 electrons a grey level",
+            Self::Paper => "the paper's simulator: 8 bits, 70 electrons per grey level",
             Self::Orca05g => "the paper's camera: a cooled CCD of 12 bits",
             Self::Scmos => "a scientific CMOS camera of 16 bits",
         }

@@ -4,12 +4,12 @@ use super::number::{Count, Number};
 use super::section::section;
 
 section! {
-    /// Image: its size and its pixel size. Densities of cells and debris apply to its
-    /// area. Objects of a density also have centres in a margin of 60 µm around it, so that they reach into the image.
+    /// Size and pixel size of the image. Densities of cells and debris apply to its area. Objects whose number is given
+    /// per mm² may also have their centres in a margin of 60 µm around the image.
     pub struct Field {
-        /// Width of the image. Drawn once a field.
+        /// Width of the image. Drawn once per field.
         width_px: Count = 1376, 16..=32768, "pixels";
-        /// Height of the image. Drawn once a field.
+        /// Height of the image. Drawn once per field.
         height_px: Count = 1038, 16..=32768, "pixels";
         /// Pixel size in the object (the paper: 0.25). Ignored if `magnification` is above 0.
         pixel_um: Number = 0.25, 0.05..=4, "µm";
@@ -93,7 +93,7 @@ section! {
         illumination: Illumination;
         /// Amplitude of the Perlin noise of the background, as a fraction of the largest grey level (c_pe of Eq. 9).
         texture: Number = Number::uniform(0.015, 0.045), 0..=0.5;
-        /// Cell size of the Perlin noise of the background.
+        /// Lattice spacing of the Perlin noise of the background.
         texture_um: Number = 60.0, 1..=10000, "µm";
     }
 }
@@ -125,8 +125,8 @@ section! {
         lamp_k: Number = 3200.0, 2000..=10000, "K";
         /// Colour model of the dyes.
         mixing: Mixing = Mixing::Spectral;
-        /// Longitudinal chromatic aberration: distance of the focus of red light (0.65 µm) beyond that of green light
-        /// (0.55 µm). Below 1 for an apochromat.
+        /// Longitudinal chromatic aberration: stage position at which red light (0.65 µm) is in focus, minus that of
+        /// green light (0.55 µm). Below 1 for an apochromat.
         chromatic_um: Number = 0.3, -10..=10, "µm of stage travel";
         /// Colour rendition of the camera.
         rendition: Rendition = Rendition::Display;
@@ -162,8 +162,7 @@ section! {
     /// Optics between slide and sensor.
     #[expect(clippy::large_enum_variant, reason = "a recipe has one value of it")]
     pub enum Optics, by default BrightField {
-        /// Partially coherent bright field: the transmission of each slab, filtered by the weak-object transfer
-        /// function.
+        /// Partially coherent bright field; `imaging` selects the model.
         BrightField(Microscope),
         /// The paper's model: Gaussian blur of the absorbance (Eqs. 13, 14, Fig. 10).
         Gaussian(Gaussians),
@@ -195,7 +194,7 @@ section! {
         extra_blur_um: Number = 0.16, 0..=10, "µm";
         /// Fraction of the light of an empty field that is evenly distributed stray light (glare).
         stray_light: Number = Number::uniform(0.01, 0.04), 0..=0.5;
-        /// Oversampling: samples of the slide along the side of a pixel.
+        /// Oversampling: number of samples per pixel in x and in y.
         oversampling: Count = 2, 1..=4;
         /// Imaging model.
         imaging: Imaging (last) = Imaging::Product;
@@ -211,8 +210,8 @@ section! {
     pub struct Gaussians {
         /// Standard deviation of the blur in focus (the paper: 0.9 px of 0.25 µm).
         sigma_xy_um: Number = 0.225, 0..=20, "µm";
-        /// Increase of the blur with distance from focus. The paper's calibration is 0.25, one pixel of 0.25 µm per µm;
-        /// its sentence read as "µm per µm" gives 1.
+        /// Increase of the blur with distance from focus. The paper's program uses 0.25, one pixel of 0.25 µm per µm.
+        /// Its text, "σ ≈ dz, in µm", gives 1.
         sigma_z_um_per_um: Number = 0.25, 0..=10, "µm per µm";
     }
 }
@@ -220,7 +219,7 @@ section! {
 section! {
     /// Imaging model of bright-field optics.
     pub enum Imaging {
-        /// The product of the transmissions of all objects, each filtered by the weak-object transfer function.
+        /// The product of the transmittances of all objects, each filtered by the weak-object transfer function.
         /// Accurate to one or two per cent of the contrast.
         Product,
         /// Abbe's integration over the source, with propagation from slab to slab. The reference, thousands of times

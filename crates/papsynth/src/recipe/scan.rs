@@ -29,7 +29,8 @@ section! {
     /// The round deposit of a liquid-based preparation. The default is a circle of 13 mm diameter, as made by filters
     /// and settling chambers.
     pub struct Deposit, drawn as pub(crate) SceneDeposit {
-        /// Centre of the deposit, from the left border of the image. All numbers of the deposit are drawn once a slide.
+        /// Centre of the deposit, from the left border of the image. All numbers of the deposit are drawn once per
+        /// slide.
         x_um: Number = 7000.0, -1000000..=1000000, "µm";
         /// Centre of the deposit, from the upper border of the image.
         y_um: Number = 7000.0, -1000000..=1000000, "µm";

@@ -12,24 +12,26 @@ use super::number::{Count, Number};
 use super::section::{Bounds, Declared, Part, section, within};
 
 section! {
-    /// Depth and spacing of the cells ("Final Image Formation": depth from a median-filtered Perlin image).
+    /// Depth and spacing of the cells. The depth is a median-filtered Perlin image (paper, section "Final Image
+    /// Formation").
     pub struct SlideSection {
-        /// Range of depth of the cells of a field, without `stacking_um`.
+        /// Difference between the largest and the smallest depth in a field, before `stacking_um`.
         depth_um: Number = Number::uniform(1.0, 4.0), 0..=1000, "µm";
-        /// Length scale of the variation of depth: cell size of its Perlin noise.
+        /// Length scale of the variation of depth: lattice spacing of its Perlin noise.
         depth_scale_um: Number = 90.0, 1..=10000, "µm";
         /// Width of the median filter of the depth.
         depth_filter_um: Number = 20.0, 0..=1000, "µm";
-        /// Standard deviation of the depth of a cell about that of its place, for cells on top of each other.
+        /// Standard deviation of the random depth of each cell, added to the depth of its position. Separates
+        /// overlapping cells.
         stacking_um: Number = 0.6, 0..=100, "µm";
-        /// Minimum distance between the centres of cells. Drawn once a field.
+        /// Minimum distance between the centres of cells. Drawn once per field.
         spacing_um: Number = 9.0, 0..=1000, "µm";
         /// Fields per slide. The first n images show slide 0, the next n slide 1. Fields of a slide share its stain.
         fields_per_slide: usize = 16, 1..=1000000;
     }
 }
 
-/// Layout of the cells: the weight map of "Population Distribution Generation".
+/// Layout of the cells: the weight map of the paper (section "Population Distribution Generation").
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Layout {
@@ -44,7 +46,7 @@ pub enum Layout {
         /// File of the density map, relative to the recipe.
         path: String,
     },
-    /// The density of the labels of a given label image.
+    /// Cells are placed where a given label image has objects, after smoothing.
     #[serde(deserialize_with = "labels_of_a_file")]
     Labels(Labels),
 }
@@ -52,7 +54,7 @@ pub enum Layout {
 section! {
     /// Round clusters at random places, and cells outside them.
     pub struct Clusters {
-        /// Number of clusters. Drawn once a field.
+        /// Number of clusters. Drawn once per field.
         count: Abundance = Abundance::per_mm2(Number::uniform(55.0, 125.0)), 1..=10000, "per field or per mm²";
         /// Radius (standard deviation) of a cluster. Drawn for each cluster.
         radius_um: Number = Number::uniform(14.0, 34.0), 1..=10000, "µm";
@@ -72,7 +74,7 @@ section! {
 }
 
 section! {
-    /// The density of the labels of a given label image.
+    /// Cells are placed where a given label image has objects, after smoothing.
     #[schemars(extend("required" = ["path"]))]
     pub struct Labels {
         /// File of the label image, relative to the recipe.
@@ -137,13 +139,13 @@ pub(super) fn default_cells() -> Cells {
 section! {
     /// Number of cells of a class, and their differences from the model.
     pub struct CellMix {
-        /// Number of cells of the class. Drawn once a field.
+        /// Number of cells of the class. Drawn once per field.
         count: Abundance = Abundance::per_mm2(110), 0..=100000, "per field or per mm²";
-        /// Size factor of the cell. Drawn for each cell.
+        /// Factor by which the size of the cell is multiplied. Drawn for each cell.
         size: Number = 1.0, 0.1..=10;
-        /// Absorbance factor of the cytoplasm. Drawn for each cell.
+        /// Factor by which the absorbance of the cytoplasm is multiplied. Drawn for each cell.
         cytoplasm_stain: Number = 1.0, 0..=20;
-        /// Absorbance factor of the nucleus. Drawn for each cell.
+        /// Factor by which the absorbance of the nucleus is multiplied. Drawn for each cell.
         nucleus_stain: Number = 1.0, 0..=20;
         /// Relative frequencies of the tints of the cytoplasm.
         tints: TintMix;
@@ -171,9 +173,9 @@ section! {
         Single,
         /// An irregular aggregate: each cell next to another one.
         Aggregate,
-        /// A single layer of adjacent cells, as the honeycomb of endocervical cells.
+        /// A single layer of adjacent cells, like the honeycomb of endocervical cells.
         Honeycomb,
-        /// A row of parallel cells, as the palisade of columnar cells.
+        /// A row of parallel cells, like the palisade of columnar cells.
         Palisade,
     }
 }
@@ -181,11 +183,11 @@ section! {
 section! {
     /// Relative frequencies of the tints of cytoplasm.
     pub struct TintMix {
-        /// Relative frequency of blue-green, as in parabasal and intermediate cells.
+        /// Relative frequency of blue-green, as seen in parabasal and intermediate cells.
         cyanophilic: Number = 0.85, 0..=1000;
-        /// Relative frequency of pink, as in superficial cells.
+        /// Relative frequency of pink, as seen in superficial cells.
         eosinophilic: Number = 0.15, 0..=1000;
-        /// Relative frequency of orange, as in keratinised cells.
+        /// Relative frequency of orange, as seen in keratinised cells.
         orangeophilic: Number = 0.0, 0..=1000;
     }
 }
@@ -223,11 +225,13 @@ section! {
 section! {
     /// Folds of the cytoplasm.
     pub struct Folds {
-        /// Probability of a flap: a part of the cell folded back on it.
+        /// Probability of a flap, a part of the cell that is folded back, before multiplication with the pliability of
+        /// the cell class.
         flap: Number = 0.38, 0..=1;
-        /// Probability of a rolled rim.
+        /// Probability of a rolled rim, before multiplication with the pliability of the cell class.
         roll: Number = 0.18, 0..=1;
-        /// Probability that both sides of the cell are folded over, like a cigar.
+        /// Probability that both sides of the cell are folded over, before multiplication with the pliability of the
+        /// cell class.
         folded_over: Number = 0.02, 0..=1;
         /// Distance of the crease of a flap from the rim, as a fraction of the radius of the cell.
         depth: Number = Number::uniform(0.10, 0.50), 0.02..=0.9;
@@ -253,7 +257,7 @@ section! {
         notches: Number (given usize) = Number::uniform(0.0, 14.0), 0..=20;
         /// Number of protrusions of the rim.
         protrusions: Number (given usize) = Number::uniform(0.0, 9.0), 0..=20;
-        /// Number of wrinkles: narrow creases where the sheet is double.
+        /// Number of wrinkles: narrow folds of double thickness.
         wrinkles: Number (given usize) = Number::log_normal(7.0, 0.6), 0..=100;
         /// Additional thickness at the crest of a wrinkle, relative to the flat sheet.
         wrinkle_thickness: Number (given f64) = Number::log_normal(0.42, 0.42), 0..=5;
@@ -266,10 +270,10 @@ section! {
         clouds: Number = Number::uniform(0.10, 0.34), 0..=2;
         /// Standard deviation of the smoothing of that noise.
         clouds_um: Number = Number::uniform(3.0, 14.0), 0.1..=100, "µm";
-        /// Amplitude of the second level of detail, thresholded Brownian flecks, relative to the absorbance of the
-        /// cytoplasm.
+        /// Amplitude of the second level of detail, relative to the absorbance of the cytoplasm: spots, made by
+        /// thresholding Brownian noise.
         flecks: Number = Number::log_normal(0.14, 0.5).at_least(0.0).at_most(0.5), 0..=5;
-        /// Fraction of the cell without flecks.
+        /// Quantile of the Brownian noise at which it is thresholded: the fraction of the cell without spots.
         flecks_threshold: Number = Number::uniform(0.55, 0.85), 0..=0.999;
         /// Amplitude of the third level of detail, the cytoskeleton, relative to the absorbance of the cytoplasm.
         cytoskeleton: Number = Number::uniform(0.05, 0.18), 0..=2;
@@ -280,17 +284,17 @@ section! {
         /// Number of granules of a granular cell per 100 µm².
         granules: Number
             (given f64 as granules: "Number of granules per 100 µm², 0 if the cell is not granular.") = Number::log_normal(12.0, 0.6), 0..=1000;
-        /// Roughness of the rim: width over which it is frayed.
+        /// Amplitude of the irregularity of the outline.
         fray_um: Number = Number::log_normal(0.65, 0.45), 0..=5, "µm";
-        /// Width of the thinner rim of the sheet.
+        /// Width of the marginal zone in which the sheet becomes thinner.
         rim_um: Number (given f64) = Number::log_normal(2.2, 0.36), 0..=10, "µm";
         /// Gradient of the thickness of the sheet: standard deviation of the relative change over the radius of the
         /// cell.
         thickness_gradient: Number
             (given [f64; 2] as thickness_gradient: "Relative change of the thickness over a radius to the right and downwards.")
             = 0.18, 0..=1;
-        /// Phase delay of the flat sheet, in proportion to the thickness elsewhere. It gives bright and dark rims that
-        /// swap when the focus passes.
+        /// Phase delay of the flat sheet; elsewhere proportional to the thickness. Causes a bright or dark rim that
+        /// reverses between the two sides of focus.
         phase_rad: Number (undrawn) = Number::uniform(0.05, 0.15), -3..=3, "radians of phase";
     }
 }
@@ -306,7 +310,7 @@ section! {
 }
 
 section! {
-    /// Selection of the patches of the donors ("Texture synthesis").
+    /// Selection of the patches of the donors (paper, section "Texture synthesis").
     pub enum Acceptance {
         /// A random one of the patches whose overlap differs by at most 10 % more than that of the best patch.
         Near,
@@ -353,7 +357,8 @@ section! {
         overlap_um: Number = 0.5, 0.25..=10, "µm";
         /// Selection of the patches.
         acceptance: Acceptance = Acceptance::Near;
-        /// Largest accepted root-mean-square difference of the absorbance over the overlap (d_max of the paper).
+        /// Only for `acceptance = "threshold"`: largest accepted root-mean-square difference of the absorbance over the
+        /// overlap (d_max of the paper).
         d_max: Number = 0.1, 0..=10;
         /// Seams between patches.
         seam: Seam = Seam::MinCut;
@@ -371,7 +376,8 @@ section! {
         dome: Number = Number::uniform(0.3, 0.85), 0..=1;
         /// Gradient of the thickness of a nucleus: standard deviation of the relative change over its radius.
         thickness_gradient: Number = 0.2, 0..=1;
-        /// Fraction of the variance of chromatin that is coarse (1.5 µm), from chromatin above and below the focus.
+        /// Fraction of the variance of the chromatin at a scale of 1.5 µm. Models chromatin above and below the plane
+        /// in focus.
         clumping: Number = Number::uniform(0.0, 0.4), 0..=1;
         /// Softness of the edge of a nucleus: standard deviation of the falloff of its thickness at the outline.
         edge_um: Number = Number::uniform(0.0, 0.2), 0..=3, "µm";
@@ -381,15 +387,15 @@ section! {
 section! {
     /// Stain: its strength, its variation and its dyes.
     pub struct Stain {
-        /// Absorbance factor of the cytoplasm of a slide. Drawn once a slide.
+        /// Factor by which the absorbance of the cytoplasm of a slide is multiplied. Drawn once per slide.
         slide_cytoplasm: Number = Number::log_normal(0.75, 0.2), 0..=20;
-        /// Absorbance factor of the nuclei of a slide. Drawn once a slide.
+        /// Factor by which the absorbance of the nuclei of a slide is multiplied. Drawn once per slide.
         slide_nucleus: Number = Number::log_normal(0.75, 0.25), 0..=20;
-        /// Absorbance factor of the cytoplasm of a field. Drawn once a field.
+        /// Factor by which the absorbance of the cytoplasm of a field is multiplied. Drawn once per field.
         field_cytoplasm: Number = Number::log_normal(1.0, 0.2), 0..=20;
-        /// Absorbance factor of the nuclei of a field. Drawn once a field.
+        /// Factor by which the absorbance of the nuclei of a field is multiplied. Drawn once per field.
         field_nucleus: Number = Number::log_normal(1.0, 0.12), 0..=20;
-        /// Contrast factor of the texture of the nuclei of a field. Drawn once a field.
+        /// Factor by which the contrast of the texture of the nuclei of a field is multiplied. Drawn once per field.
         field_texture: Number = Number::log_normal(0.7, 0.28), 0..=20;
         /// Variation of the dye balance between slides: standard deviation of the logarithm of each dye's amount.
         slide_balance: Number = 0.15, 0..=2;

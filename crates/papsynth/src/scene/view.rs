@@ -1,4 +1,4 @@
-//! The size of a field, and numbers drawn once a field.
+//! The size of a field, and numbers drawn once per field.
 
 use serde::{Deserialize, Serialize};
 

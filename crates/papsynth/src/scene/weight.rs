@@ -1,4 +1,4 @@
-//! Weight maps and rejection sampling from them ("Population Distribution Generation").
+//! Weight maps and rejection sampling from them (paper, section "Population Distribution Generation").
 
 use rand_core::Rng;
 

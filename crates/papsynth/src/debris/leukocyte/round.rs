@@ -1,4 +1,4 @@
-//! The paper's white blood cells: one perturbed circle.
+//! The paper's leukocytes: one perturbed circle.
 
 use super::Leukocyte;
 use crate::debris::prelude::*;

@@ -1,4 +1,5 @@
-//! Epithelial cells: outline, sheet, folds, and the three levels of detail ("Squamous Intermediate Cell Phantoms").
+//! Epithelial cells: outline, sheet, folds, and the three levels of detail (paper, section "Squamous Intermediate Cell
+//! Phantoms").
 
 use cloth_verlet::{Crease, FoldKind, PixelGrid, Sheet, SheetSpec, crease_outline};
 

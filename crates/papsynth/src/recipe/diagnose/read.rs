@@ -233,7 +233,7 @@ fn type_message(expected: &str, found: &DeValue<'_>) -> String {
     format!("expected {expected}, found {}", type_of(found).1)
 }
 
-/// Returns a message about a value that is none of the accepted words.
+/// Returns a message about a value that is not an accepted word.
 fn unknown_value(path: &[String], word: &str) -> String {
     match renamed::value(path, word) {
         Some(present) => format!("unknown value \"{word}\": it is now \"{present}\""),
