@@ -70,5 +70,5 @@ fn a_study_prints_its_address_and_continues_after_an_interrupt() {
     assert!(other.err.contains("trials is 6, expected 4"), "{}", other.err);
     let pooled = bench.run("study --results results");
     assert_eq!(pooled.code, 2);
-    assert!(pooled.err.contains("none of 1 studies is finished"), "{}", pooled.err);
+    assert!(pooled.err.contains("finished studies: 0 of 1"), "{}", pooled.err);
 }

@@ -152,16 +152,16 @@ mod tests {
         for (text, expected) in [
             ("[classes]", "version is missing"),
             ("version = 2", "version is 2"),
-            ("version = 1\nclass = 3", "`class` is not known"),
+            ("version = 1\nclass = 3", "unknown key `class`"),
             ("version = 1\nclasses = 3", "expected a table"),
-            ("version = 1\n[classes.a]\nlike = \"b\"\n[classes.b]\nlike = \"a\"", "in a circle"),
+            ("version = 1\n[classes.a]\nlike = \"b\"\n[classes.b]\nlike = \"a\"", "form a cycle"),
             ("version = 1\n[classes.a]\nlike = \"missing\"", "no class `missing`"),
-            ("version = 1\n[classes.\"../a\"]\nlike = \"intermediate\"", "`../a` is no name"),
-            ("version = 1\n[classes.\"\"]\nlike = \"intermediate\"", "`` is no name"),
+            ("version = 1\n[classes.\"../a\"]\nlike = \"intermediate\"", "invalid name `../a`"),
+            ("version = 1\n[classes.\"\"]\nlike = \"intermediate\"", "invalid name ``"),
             ("version = 1\n[classes.a]\nlike = \"intermediate\"\ncytoplasm.form.taper = 4", "cytoplasm.form.taper: 4"),
             ("version = 1\n[classes.a]\nlike = \"intermediate\"\nnucleus.size = 4", "unknown field `size`"),
             ("version = 1\n[classes.a]\nbethesda = \"NILM\"", "missing field"),
-            ("{", "no model of papsynth"),
+            ("{", "papsynth"),
         ] {
             let message = with(text).unwrap_err();
             assert!(message.contains(expected), "{text:?}: {message}");
