@@ -24,8 +24,8 @@ pub enum Spectrum {
     },
     /// S(f) ∝ (1 + (2π f l)² / 2ν)^-(ν + 1), the Matérn family: rough at small distances, uncorrelated beyond a few l.
     Matern {
-        /// Smoothness ν, above 0, at most 20. If ν is 0.5, the autocorrelation is exponential. If ν is large, it is nearly
-        /// Gaussian.
+        /// Smoothness ν, above 0, at most 20. If ν is 0.5, the autocorrelation is exponential. If ν is large, it is
+        /// nearly Gaussian.
         nu: f64,
         /// Correlation length l in pixels, 0.001 to 1000000.
         length_px: f64,
