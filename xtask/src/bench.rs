@@ -16,7 +16,7 @@ use crate::{peers, shell};
 #[command(args_conflicts_with_subcommands = true)]
 pub(crate) struct Bench {
     #[command(subcommand)]
-    instead: Option<Instead>,
+    command: Option<BenchCommand>,
     /// Saves the results under a name
     #[arg(long, value_name = "NAME")]
     save: Option<String>,
@@ -29,11 +29,11 @@ pub(crate) struct Bench {
 }
 
 #[derive(Subcommand)]
-enum Instead {
-    /// Counts the instructions of small kernels with valgrind, and fails if one takes 2 % more than in
-    /// benches/counts.json for this compiler
+enum BenchCommand {
+    /// Counts the instructions of small kernels with valgrind, and fails if a count is more than 2 % above that of this
+    /// compiler in benches/counts.json
     Counts {
-        /// Replaces the counts
+        /// Replaces the counts in benches/counts.json
         #[arg(long)]
         bless: bool,
     },
@@ -41,12 +41,12 @@ enum Instead {
 }
 
 pub(crate) fn run(workspace: &Workspace, arguments: Bench) -> Result<()> {
-    match arguments.instead {
-        Some(Instead::Counts { bless }) => return counts::run(workspace, bless),
-        Some(Instead::Peers(peers)) => return peers::run(workspace, &peers),
+    match arguments.command {
+        Some(BenchCommand::Counts { bless }) => return counts::run(workspace, bless),
+        Some(BenchCommand::Peers(peers)) => return peers::run(workspace, &peers),
         None => {}
     }
-    // Named one by one, because the test harness of a library does not accept arguments of criterion.
+    // Selects each benchmark by name, because the test harness of a library rejects arguments of criterion.
     let targets = workspace.packages.iter().flat_map(|package| &package.targets);
     let benches = targets.filter(|target| target.kind.iter().any(|kind| kind == "bench"));
     let mut command = workspace.cargo();

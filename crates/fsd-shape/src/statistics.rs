@@ -88,7 +88,7 @@ impl PrincipalComponent {
 }
 
 impl ShapeStatistics {
-    /// Returns the statistics with every number rounded to `digits` significant decimal digits (1..=17), for compact
+    /// Returns the statistics with every number rounded to `digits` significant decimal digits (1 to 17), for compact
     /// files.
     ///
     /// Five digits change drawn outlines by less than a hundredth of a pixel per 100 px of radius.
@@ -98,7 +98,7 @@ impl ShapeStatistics {
     /// If `digits` is 0 or above 17.
     pub fn rounded(&self, digits: usize) -> Result<Self, Error> {
         if !(1..=17).contains(&digits) {
-            return Err(Error::Parameter { field: "digits", value: digits as f64, accepted: "1..=17" });
+            return Err(Error::Parameter { field: "digits", value: digits as f64, accepted: "1 to 17" });
         }
         // Rounds through the decimal representation, which is exact on every platform.
         let round = |v: &mut f64| *v = format!("{v:.*e}", digits - 1).parse().unwrap_or(*v);
@@ -145,7 +145,7 @@ impl ShapeStatistics {
 
     pub(crate) fn check(&self) -> Result<(), Error> {
         if !(1..=MAX_HARMONICS).contains(&self.harmonics) {
-            return wrong("harmonics", format!("= {}: expected 1..={MAX_HARMONICS}", self.harmonics));
+            return wrong("harmonics", format!("= {}: expected 1 to {MAX_HARMONICS}", self.harmonics));
         }
         check_number("ln_radius_mean", self.ln_radius_mean, -100.0, 100.0)?;
         check_number("ln_radius_sd", self.ln_radius_sd, 0.0, 10.0)?;
@@ -159,7 +159,8 @@ impl ShapeStatistics {
                 return wrong(
                     "components",
                     format!(
-                        "[{k}]: skewness {} and excess kurtosis {} are out of range: expected -2..=2 and 1.7 skewness² - 1 to 12",
+                        "[{k}]: skewness {} and excess kurtosis {} are out of range: expected -2 to 2 and \
+                         1.7 skewness² - 1 to 12",
                         component.skewness, component.excess_kurtosis
                     ),
                 );
@@ -186,9 +187,12 @@ fn check_number(field: &'static str, value: f64, least: f64, most: f64) -> Resul
     if (least..=most).contains(&value) {
         return Ok(());
     }
-    let least = if least == f64::MIN { "any".to_owned() } else { least.to_string() };
-    let most = if most == f64::MAX { "finite".to_owned() } else { most.to_string() };
-    wrong(field, format!("contains {value}: expected {least}..={most}"))
+    let accepted = match (least == f64::MIN, most == f64::MAX) {
+        (true, _) => "a finite number".to_owned(),
+        (false, true) => format!("a finite number of at least {least}"),
+        (false, false) => format!("{least} to {most}"),
+    };
+    wrong(field, format!("contains {value}: expected {accepted}"))
 }
 
 fn wrong(field: &'static str, problem: String) -> Result<(), Error> {

@@ -18,8 +18,12 @@ pub enum Error {
     },
     /// A window exceeds the image or is too small.
     #[error(
-        "invalid window ({window:?}): it must lie inside the image of {width} x {height} pixels and be at least \
-         {min_side} pixels wide and high"
+        "window {},{},{},{} (left, top, width, height): expected a part inside the image of {width} x {height} px, at \
+         least {min_side} px wide and high",
+        window.left,
+        window.top,
+        window.width,
+        window.height
     )]
     Window {
         /// The window.
@@ -33,7 +37,8 @@ pub enum Error {
     },
     /// The sharpest plane of a stack is its first or last.
     #[error(
-        "the sharpest of {planes} planes is number {sharpest}, the stack's end: take planes on both sides of focus"
+        "plane {} of {planes} is the sharpest, but it is the first or last plane: record planes on both sides of focus",
+        sharpest + 1
     )]
     FocusAtStackEnd {
         /// Index of the sharpest plane, from 0.

@@ -24,10 +24,10 @@ pub enum Error {
         source: optics_psf::Error,
     },
     /// The aperture of the condenser cannot be estimated.
-    #[error("the condenser's aperture: {0}")]
+    #[error("condenser aperture: {0}")]
     Condenser(optics_psf::Error),
     /// A parameter of the microscope is out of range.
-    #[error("the microscope: {0}")]
+    #[error("microscope: {0}")]
     Microscope(optics_psf::Error),
     /// The square around a line is too small, or extends beyond the image.
     #[error("line {},{},{},{}: its square extends beyond the {width} x {height} image, or is smaller than 8 px", line[0], line[1], line[2], line[3])]
@@ -65,8 +65,8 @@ pub enum Error {
         /// Size of the window.
         least: usize,
     },
-    /// A grey level exceeds the bits of the camera.
-    #[error("{name}: the grey level {value} exceeds the bits of the camera")]
+    /// A grey level is above the maximum of the bit depth of the camera.
+    #[error("{name}: the grey level {value} is above the maximum of this bit depth")]
     Bits {
         /// The light level.
         name: String,

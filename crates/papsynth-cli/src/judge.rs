@@ -99,7 +99,7 @@ fn sides(args: &args::Judge) -> Result<(Side, Side), ExitError> {
 fn enough(folder: &Path, files: Vec<FieldFile>) -> Result<Vec<FieldFile>, ExitError> {
     if files.len() < MIN_FIELDS {
         let found = counted(files.len() as u64, "field", "fields");
-        let message = format!("{}: {found}; at least {MIN_FIELDS} are needed", folder.display());
+        let message = format!("{}: {found}; expected at least {MIN_FIELDS}", folder.display());
         return Err(ExitError::with_help(message, "training and test use different fields"));
     }
     Ok(files)
@@ -152,7 +152,10 @@ fn nuclei_from(args: &args::Judge, real: &Side, synthetic: &Side) -> Result<Nucl
     };
     let Some(file) = lacks(from) else { return Ok(from) };
     let message = format!("--nuclei {0}: {1} has no {0}", from.name(), file.path().display());
-    Err(ExitError::with_help(message, "all fields of both sides need them"))
+    Err(ExitError::with_help(
+        message,
+        format!("leave out --nuclei, or give {} for all fields of both sides", from.name()),
+    ))
 }
 
 /// Measures the fields of a side at the common pixel size.

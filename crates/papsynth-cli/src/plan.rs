@@ -18,8 +18,8 @@ use crate::words::{counted, size};
 const T: [f64; 15] = [12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26, 2.23, 2.20, 2.18, 2.16, 2.14, 2.13];
 
 pub(crate) fn run(args: &Plan) -> Result<(), ExitError> {
-    if args.per_core_hour.is_some_and(|price| !(price >= 0.0 && price.is_finite())) {
-        return Err(ExitError::input("--per-core-hour: expected a price of 0 or more"));
+    if let Some(price) = args.per_core_hour.filter(|price| !(*price >= 0.0 && price.is_finite())) {
+        return Err(ExitError::input(format!("--per-core-hour: {price} is out of range: expected 0 or more")));
     }
     let setup = Setup::load(&args.engine, None)?;
     let (layout, _) = args.layout.layout(args.frames);

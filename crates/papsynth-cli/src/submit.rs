@@ -12,7 +12,7 @@ pub(crate) fn run(args: &Submit) -> Result<(), ExitError> {
     let words = ["papsynth", "generate"].into_iter().chain(args.arguments.iter().map(String::as_str));
     let generate = match args::parse(words.map(Into::into)) {
         Ok(Cli { verb: Verb::Generate(generate) }) => generate,
-        Ok(_) => return Err(ExitError::input("the words after `--` are not arguments of `papsynth generate`")),
+        Ok(_) => return Err(ExitError::input("after `--`: expected only arguments of `papsynth generate`")),
         Err(error) => return Err(ExitError::input(error)),
     };
     if generate.task.task.is_some() || generate.engine.threads.is_some() {
@@ -105,7 +105,7 @@ fn kubernetes(args: &Submit) -> String {
          \x20 completions: {tasks}\n\
          \x20 parallelism: {tasks}\n\
          \x20 backoffLimitPerIndex: 5\n\
-         \x20 podExitErrorPolicy:\n\
+         \x20 podFailurePolicy:\n\
          \x20   rules:\n\
          \x20   # Usage, recipe or input: the task would fail again.\n\
          \x20   - action: FailIndex\n\

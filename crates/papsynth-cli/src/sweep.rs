@@ -40,9 +40,9 @@ pub(crate) fn run(args: &Sweep) -> Result<(), ExitError> {
     }
     let count = axes.iter().try_fold(1_usize, |product, axis| product.checked_mul(axis.values.len()));
     let Some(count) = count.filter(|count| *count <= MAX_COMBINATIONS) else {
-        return Err(ExitError::input(format!(
-            "more than {MAX_COMBINATIONS} combinations; vary fewer fields or values"
-        )));
+        let found = count.map_or_else(|| "too many".to_owned(), |count| count.to_string());
+        let message = format!("--vary: {found} combinations; expected at most {MAX_COMBINATIONS}");
+        return Err(ExitError::with_help(message, "vary fewer fields or values"));
     };
     let (layout, _) = args.layout.layout(args.frames);
     // Errors of any combination are reported before the first is generated.
@@ -81,7 +81,7 @@ pub(crate) fn run(args: &Sweep) -> Result<(), ExitError> {
 fn check_out(out: &Path, count: usize) -> Result<(), ExitError> {
     let refuse = |name: &str| {
         let message = format!("{}: the folder holds `{name}`, which is not part of this sweep", out.display());
-        Err(ExitError::with_help(message, "choose another or a new folder"))
+        Err(ExitError::with_help(message, "choose a new or empty folder"))
     };
     let entries = match fs::read_dir(out) {
         Ok(entries) => entries,

@@ -60,7 +60,7 @@ fn from_environment(count: Option<u64>, variable: impl Fn(&str) -> Option<String
         text.trim().parse().map(Some).map_err(wrong)
     };
     let unknown = |message: &str| Err(ExitError::with_help(message, "give the number of tasks: --task auto/N"));
-    let (index, count) = if let Some(index) = number("SLURM_ARRAY_TASK_ID")? {
+    let (name, index, count) = if let Some(index) = number("SLURM_ARRAY_TASK_ID")? {
         // A repaired array (`--array=3,17`) does not state the original number of tasks.
         let (tasks, first) = (number("SLURM_ARRAY_TASK_COUNT")?, number("SLURM_ARRAY_TASK_MIN")?.unwrap_or(0));
         let last = if count.is_none() { number("SLURM_ARRAY_TASK_MAX")? } else { None };
@@ -68,10 +68,10 @@ fn from_environment(count: Option<u64>, variable: impl Fn(&str) -> Option<String
         let Some(count) = count.or(tasks.filter(|_| is_complete)) else {
             return unknown("the Slurm array does not consist of the tasks 0 to N − 1, so N is unknown");
         };
-        (index, count)
+        ("SLURM_ARRAY_TASK_ID", index, count)
     } else if let Some(index) = number("JOB_COMPLETION_INDEX")? {
         let Some(count) = count else { return unknown("Kubernetes does not set the number of completions") };
-        (index, count)
+        ("JOB_COMPLETION_INDEX", index, count)
     } else {
         let message = "--task auto: neither SLURM_ARRAY_TASK_ID nor JOB_COMPLETION_INDEX is set";
         return Err(ExitError::with_help(message, "give the task, for example --task 0/4"));
@@ -79,7 +79,8 @@ fn from_environment(count: Option<u64>, variable: impl Fn(&str) -> Option<String
     match index < count {
         true => Ok(Task { index, total: count }),
         false => {
-            Err(ExitError::input(format!("task {index} is out of range: expected 0 to {}", count.saturating_sub(1))))
+            let last = count.saturating_sub(1);
+            Err(ExitError::input(format!("--task auto: {name} is {index}; expected 0 to {last}")))
         }
     }
 }

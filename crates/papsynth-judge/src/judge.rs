@@ -82,7 +82,7 @@ pub struct Test<T> {
     pub name: String,
     /// Conclusion.
     pub conclusion: Conclusion,
-    /// Numbers.
+    /// Measured values of the test.
     pub result: T,
 }
 
@@ -99,8 +99,8 @@ pub struct Report {
     pub fields: [Vec<String>; 2],
     /// Warnings: the same image on both sides, too few objects, ….
     pub warnings: Vec<String>,
-    /// Distinguishable if any test concludes that. One test is wrong in about 1 of 20 comparisons, this
-    /// conclusion in 1 of 8.
+    /// Distinguishable if the conclusion of any test is "distinguishable". If both sides are real fields, one test is
+    /// wrongly "distinguishable" in about 1 of 20 comparisons, and this conclusion in about 1 of 8.
     pub conclusion: Conclusion,
     /// Classifier tests on nuclei, cells and patches, then on the nuclei of each group that both sides have.
     pub two_sample: Vec<Test<TwoSample>>,
@@ -202,7 +202,9 @@ impl Judge {
             let (params, seed, phase) = (&self.params.two_sample, self.params.seed, format!("classifying {name}"));
             match two_sample(&tables(real), &tables(synthetic), params, seed, &phase, control)? {
                 Some(result) => tests.push(Test { name, conclusion: of_areas(&result), result }),
-                None => warnings.push(format!("{name}: not compared, because fewer than 2 fields of a side have any")),
+                None => {
+                    warnings.push(format!("{name}: not compared; expected at least 2 fields with {name} on each side"))
+                }
             }
             Ok(())
         };
@@ -225,7 +227,7 @@ impl Judge {
         let tables = |fields: &[Field]| fields.iter().map(|f| f.nuclei.clone()).collect::<Vec<FeatureTable>>();
         let (real, synthetic) = (tables(real), tables(synthetic));
         let mut tests = Vec::new();
-        for (n, what) in [(self.params.paper_nuclei, "number of the paper"), (0, "all nuclei")] {
+        for (n, what) in [(self.params.paper_nuclei, "as many as in the paper"), (0, "all nuclei")] {
             match moments::compare(&real, &synthetic, n, self.params.draws, self.params.seed, control)? {
                 Some(result) => {
                     let conclusion = Conclusion::new(result.descriptors.iter().any(|d| !d.within));
@@ -303,9 +305,9 @@ pub struct Scalar {
     pub name: String,
     /// The statistic in words, with its unit.
     pub description: String,
-    /// Over real fields.
+    /// Percentiles over the real fields.
     pub real: Percentiles,
-    /// Over synthetic fields.
+    /// Percentiles over the synthetic fields.
     pub synthetic: Percentiles,
     /// Whether the synthetic median is between the real 10th and 90th percentile; false if one of them is unknown.
     pub within: bool,
@@ -320,9 +322,9 @@ pub struct Curve {
     pub along: String,
     /// Horizontal positions of the points.
     pub at: Vec<f64>,
-    /// Over real fields, for each point.
+    /// Percentiles over the real fields, for each point.
     pub real: Vec<Percentiles>,
-    /// Over synthetic fields, for each point.
+    /// Percentiles over the synthetic fields, for each point.
     pub synthetic: Vec<Percentiles>,
 }
 

@@ -16,7 +16,11 @@ pub enum Error {
         what: String,
     },
     /// Too few nuclei to estimate stain and sizes.
-    #[error("found {found} nuclei in {fields} fields; expected {least} or more. Check the pixel size ({pixel_um} um)")]
+    #[error(
+        "found {} in {}; expected {least} or more nuclei. Check the pixel size ({pixel_um} µm)",
+        counted(*found, "nucleus", "nuclei"),
+        counted(*fields, "field", "fields")
+    )]
     Nuclei {
         /// Number of nuclei.
         found: usize,
@@ -46,6 +50,11 @@ pub enum Error {
     /// The stop flag was set.
     #[error("stopped")]
     Stopped,
+}
+
+/// Returns a count with its noun: "1 field", "2 fields".
+fn counted(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
 }
 
 impl From<papsynth_judge::Error> for Error {

@@ -14,8 +14,10 @@ use crate::table::SimulationTable;
 /// less weight.
 const LINEAR_FROM: f64 = 3.0;
 
-/// Maximum number of iterations of the optimiser, and number of stored gradients.
+/// Maximum number of iterations of the optimiser.
 const STEPS: u64 = 200;
+
+/// Number of gradients that the optimiser stores.
 const MEMORY: usize = 7;
 
 /// Weight of the distance from the estimate of the regression.
@@ -92,7 +94,7 @@ fn features(places: &[f64]) -> Vec<f64> {
 #[derive(Clone)]
 struct Objective<'a> {
     forward: &'a Forward,
-    /// Known statistics, and the model value that each should have.
+    /// Index of each known statistic, and the target of its model value.
     aims: Vec<(usize, f64)>,
     /// All positions. Only those of `moving` change.
     places: Vec<f64>,
@@ -101,8 +103,8 @@ struct Objective<'a> {
 }
 
 impl Objective<'_> {
-    /// Maps unbounded numbers to positions within the intervals. Returns positions and derivatives.
-    fn inside(&self, free: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    /// Maps unbounded numbers to positions in the intervals. Returns the positions and their derivatives.
+    fn bounded(&self, free: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let mut places = self.places.clone();
         let mut slopes = Vec::with_capacity(free.len());
         for ((i, e), x) in self.moving.iter().zip(free) {
@@ -113,8 +115,9 @@ impl Objective<'_> {
         (places, slopes)
     }
 
-    fn outside(&self, places: &[f64]) -> Vec<f64> {
-        /// Maximum distance from the centre, because the derivative vanishes at the ends.
+    /// Maps positions to unbounded numbers: the inverse of `bounded`.
+    fn unbounded(&self, places: &[f64]) -> Vec<f64> {
+        /// Maximum distance from the centre of an interval, in half intervals: the derivative vanishes at the ends.
         const MOST: f64 = 0.98;
         let one = |(i, e): &(usize, Estimate)| {
             libm::atanh((2.0 * (places[*i] - e.low) / (e.high - e.low).max(1e-9) - 1.0).clamp(-MOST, MOST))
@@ -122,6 +125,7 @@ impl Objective<'_> {
         self.moving.iter().map(one).collect()
     }
 
+    /// Returns the distances of the positions from their estimates, in standard errors.
     fn deviations(&self, places: &[f64]) -> impl Iterator<Item = f64> {
         // Half the interval is two standard errors.
         self.moving.iter().map(|(i, e)| 4.0 * (places[*i] - e.value) / (e.high - e.low).max(1e-9))
@@ -133,7 +137,7 @@ impl CostFunction for Objective<'_> {
     type Output = f64;
 
     fn cost(&self, free: &Vec<f64>) -> Result<f64, argmin::core::Error> {
-        let (places, _) = self.inside(free);
+        let (places, _) = self.bounded(free);
         let features = features(&places);
         let apart =
             self.aims.iter().map(|(s, aim)| robust((self.forward.at(*s, &features) - aim) / self.forward.errors[*s]));
@@ -146,7 +150,7 @@ impl Gradient for Objective<'_> {
     type Gradient = Vec<f64>;
 
     fn gradient(&self, free: &Vec<f64>) -> Result<Vec<f64>, argmin::core::Error> {
-        let (places, slopes) = self.inside(free);
+        let (places, slopes) = self.bounded(free);
         let all = features(&places);
         let count = places.len();
         let mut of_places = vec![0.0; count];
@@ -173,7 +177,7 @@ pub(crate) fn propose(forward: &Forward, seen: [&[f64]; 2], places: &[f64], movi
     let known = |s: &usize| seen.iter().all(|values| values[*s].is_finite());
     let aims = (0..wanted.len()).filter(known).map(|s| (s, wanted[s] - found[s] + forward.at(s, &here))).collect();
     let objective = Objective { forward, aims, places: places.to_vec(), moving: moving.to_vec() };
-    let start = objective.outside(places);
+    let start = objective.unbounded(places);
     if start.is_empty() {
         return places.to_vec();
     }
@@ -184,5 +188,5 @@ pub(crate) fn propose(forward: &Forward, seen: [&[f64]; 2], places: &[f64], movi
         .run()
         .ok()
         .and_then(|result| result.state().get_best_param().cloned());
-    objective.inside(&best.unwrap_or(start)).0
+    objective.bounded(&best.unwrap_or(start)).0
 }

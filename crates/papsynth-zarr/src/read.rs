@@ -16,6 +16,11 @@ const ENTRY: usize = 16;
 /// Size of the checksum, bytes.
 const CHECKSUM: usize = 4;
 
+/// Returns the first and last index of a range, for messages.
+pub(crate) fn span(range: &Range<usize>) -> String {
+    if range.is_empty() { "none".to_owned() } else { format!("{} to {}", range.start, range.end - 1) }
+}
+
 /// Reads regions of a shard that [`ShardEncoder`](crate::ShardEncoder) wrote.
 ///
 /// Memory is limited by the sizes of the array, for any file: the index, one chunk, and the region. Any change of the
@@ -72,10 +77,14 @@ impl<R: Read + Seek> ShardReader<R> {
             if !is_due {
                 continue;
             }
-            if start.checked_add(bytes).is_none_or(|end| end > data) || bytes > most {
+            let end = start.saturating_add(bytes);
+            if end > data {
                 return damaged(format!(
-                    "chunk {number} has {bytes} bytes at {start} in the index; the file has {data}"
+                    "chunk {number}: the index gives bytes {start} to {end}, but the chunk data end at byte {data}"
                 ));
+            }
+            if bytes > most {
+                return damaged(format!("chunk {number} has {bytes} bytes; expected at most {most}"));
             }
             match left.checked_sub(bytes) {
                 Some(rest) => left = rest,
@@ -115,9 +124,13 @@ impl<R: Read + Seek> ShardReader<R> {
         let fits = inside(&rows, &block.rows) && inside(&columns, &block.columns);
         if !fits || !block.planes.contains(&plane) || channel >= array.shape[0] {
             return argument(format!(
-                "rows {rows:?} and columns {columns:?} of channel {channel}, plane {plane} are not in the shard: planes {:?}, rows {:?}, \
-                 columns {:?}",
-                block.planes, block.rows, block.columns
+                "rows {} and columns {} of channel {channel}, plane {plane} are not in the shard: planes {}, rows {}, \
+                 columns {}",
+                span(&rows),
+                span(&columns),
+                span(&block.planes),
+                span(&block.rows),
+                span(&block.columns)
             ));
         }
         let (side, size) = (array.chunk, array.kind.bytes());

@@ -5,6 +5,7 @@ use zstd::zstd_safe::CParameter;
 
 use crate::array::{Array, Block, Shard, ZSTD_LEVEL};
 use crate::error::{Error, argument};
+use crate::read::span;
 use crate::sample::Sample;
 
 /// Index entry of a missing chunk.
@@ -56,8 +57,8 @@ impl ShardEncoder {
         }
         if channel >= array.shape[0] || !block.planes.contains(&plane) {
             return argument(format!(
-                "channel {channel} of plane {plane} is not in the shard of the planes {:?}",
-                block.planes
+                "channel {channel} of plane {plane} is not in the shard of the planes {}",
+                span(&block.planes)
             ));
         }
         let within = plane - block.planes.start;

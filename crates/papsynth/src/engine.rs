@@ -32,7 +32,7 @@ pub struct Engine {
     pub(crate) assets: PhantomAssets,
     pub(crate) microscopes: MicroscopeCache,
     /// Reusable memory: one element per image generated at the same time.
-    free_buffers: Mutex<Vec<FrameBuffers>>,
+    spare_buffers: Mutex<Vec<FrameBuffers>>,
 }
 
 impl Engine {
@@ -54,7 +54,7 @@ impl Engine {
             weight_map: inputs.weight_map.clone(),
             assets,
             microscopes: MicroscopeCache::default(),
-            free_buffers: Mutex::default(),
+            spare_buffers: Mutex::default(),
         })
     }
 
@@ -112,14 +112,14 @@ impl Engine {
 
     /// Runs `work` with reusable memory.
     pub(crate) fn with_buffers<T>(&self, work: impl FnOnce(&mut FrameBuffers) -> T) -> T {
-        let mut buffers = self.free_buffers().pop().unwrap_or_default();
+        let mut buffers = self.spare_buffers().pop().unwrap_or_default();
         let made = work(&mut buffers);
-        self.free_buffers().push(buffers);
+        self.spare_buffers().push(buffers);
         made
     }
 
-    fn free_buffers(&self) -> MutexGuard<'_, Vec<FrameBuffers>> {
-        self.free_buffers.lock().unwrap_or_else(PoisonError::into_inner)
+    fn spare_buffers(&self) -> MutexGuard<'_, Vec<FrameBuffers>> {
+        self.spare_buffers.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Generates an image with ground truth.

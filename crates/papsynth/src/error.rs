@@ -124,7 +124,7 @@ pub enum ErrorKind {
     #[error("pixel size: {0} µm is out of range: expected 0.05 to 4")]
     PixelSize(f64),
     /// Too few outlines.
-    #[error("{found} outlines of the {what}; expected at least {least}")]
+    #[error("outlines of the {what}: {found}; expected at least {least}")]
     TooFewOutlines {
         /// Number of outlines.
         found: usize,
@@ -150,7 +150,7 @@ pub enum ErrorKind {
     },
 
     /// The file of the layout was not given.
-    #[error("layout.path: \"{path}\" was not given; expected {what}")]
+    #[error("layout.path: the content of \"{path}\" is missing in the inputs of the engine; expected {what}")]
     NotGiven {
         /// The file.
         path: String,
@@ -375,11 +375,11 @@ pub enum NucleusError {
     /// The mask has no single outline.
     #[error("mask: {0}")]
     Mask(#[source] fsd_shape::Error),
-    /// Too few pixels around the mask.
-    #[error("{0} pixels around the mask; expected a larger crop")]
-    Crop(usize),
+    /// Too few pixels around the mask, and the minimum number.
+    #[error("pixels around the mask: {0}; expected at least {1}: use a larger crop")]
+    Crop(usize, usize),
     /// No light around the mask.
-    #[error("the pixels around the mask are black")]
+    #[error("the pixels around the mask are black; expected light of the empty slide around the nucleus")]
     Black,
     /// Too few pixels, and the minimum number.
     #[error("the mask has {0} pixels; expected at least {1}")]

@@ -24,14 +24,15 @@ pub enum Spectrum {
     },
     /// S(f) ∝ (1 + (2π f l)² / 2ν)^-(ν + 1), the Matérn family: rough at small distances, uncorrelated beyond a few l.
     Matern {
-        /// Smoothness ν, above 0, at most 20. 0.5 gives an exponential autocorrelation, infinity a Gaussian one.
+        /// Smoothness ν, above 0, at most 20. If ν is 0.5, the autocorrelation is exponential. If ν is large, it is
+        /// nearly Gaussian.
         nu: f64,
-        /// Correlation length l in pixels, above 0.
+        /// Correlation length l in pixels, 0.001 to 1000000.
         length_px: f64,
     },
     /// White noise blurred by a Gaussian, the paper's "low frequency Gaussian noise": S(f) ∝ exp(-(2π f σ)²).
     Gaussian {
-        /// Standard deviation σ of the blur in pixels, above 0.
+        /// Standard deviation σ of the blur in pixels, 0.001 to 1000000.
         sigma_px: f64,
     },
 }
@@ -61,6 +62,7 @@ impl Spectrum {
             Self::Matern { nu, length_px } => {
                 let x = (2.0 * nu).sqrt() * lag_px.abs() / length_px;
                 let scale = libm::exp2(1.0 - nu) / libm::tgamma(nu) * libm::pow(x, nu);
+                // Near distance 0, the scale underflows, and the autocorrelation is 1.
                 Some(if scale < f64::MIN_POSITIVE { 1.0 } else { scale * bessel_k(nu, x) })
             }
             Self::Gaussian { sigma_px } => {
@@ -110,6 +112,7 @@ impl Spectrum {
             }
         }
         let side = f64::from(2 * orders + 1);
+        // The variance outside the summed square is added as a constant; the square is replaced by a disc of its area.
         sum + self.variance_beyond_square(side * side / PI)
     }
 

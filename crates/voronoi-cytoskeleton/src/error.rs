@@ -52,7 +52,7 @@ pub enum Error {
     },
     /// There is no site, or sites coincide.
     #[error(
-        "{given} sites at {distinct} different positions: expected at least one site, and no two at the same position"
+        "sites: {given}, different positions: {distinct}; expected at least one site, and no two at the same position"
     )]
     Sites {
         /// Number of sites.

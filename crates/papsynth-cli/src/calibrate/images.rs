@@ -76,7 +76,8 @@ pub(super) fn edge(args: &Calibrate, path: &Path) -> Result<(Edge, Vec<[f64; 2]>
 pub(super) fn camera(args: &Calibrate, folder: &Path) -> Result<Camera, ExitError> {
     let exposures = exposures(folder, args.dark.as_deref())?;
     let bits = depth(args, &exposures[0].files[0], folder)?;
-    let mut flats = Flats::new(bits).map_err(|error| ExitError::with_help(format!("--bits: {error}"), "8 to 16"))?;
+    let mut flats =
+        Flats::new(bits).map_err(|_| ExitError::input(format!("--bits: {bits} is out of range: expected 8 to 16")))?;
     for Exposure { name, files, light } in &exposures {
         // Memory holds one level at a time.
         let images = files.iter().map(|file| GreyImage::read(file, &lossless())).collect::<Result<Vec<_>, _>>()?;

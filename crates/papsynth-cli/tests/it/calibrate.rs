@@ -378,8 +378,8 @@ fn invalid_stacks_and_edges_are_rejected() {
     write("flat.tif", &vec![vec![5.0; 192 * 192]; 4]);
     let one = "18,26,44,38";
     rejected(&bench, "", &["--stack", "--edge", "--flat"]);
-    rejected(&bench, "--stack end.tif", &["--stack end.tif: window ", "the stack's end", "both sides of focus"]);
-    rejected(&bench, &format!("--stack end.tif --window {one}"), &["window 18,26,44,38", "the stack's end"]);
+    rejected(&bench, "--stack end.tif", &["--stack end.tif: window ", "first or last plane", "both sides of focus"]);
+    rejected(&bench, &format!("--stack end.tif --window {one}"), &["window 18,26,44,38", "first or last plane"]);
     rejected(&bench, "--stack two.tif", &["--stack two.tif: planes: found 2, expected 3 or more"]);
     rejected(&bench, "--stack flat.tif", &["no nucleus found", "--window"]);
     rejected(&bench, "--stack flat.tif --window 0,0,20,20", &["holds no detail"]);

@@ -167,7 +167,7 @@ fn invalid_input_of_a_judge_is_rejected_and_no_file_is_written() {
         ("judge good empty --pixel-um 0.3", "empty: contains no PNG, JPEG or TIFF file"),
         ("judge good missing --pixel-um 0.3", "missing: there is no such folder"),
         ("judge good good", "neither folder records its pixel size"),
-        ("judge few good --pixel-um 0.3", "few: 1 field; at least 2 are needed"),
+        ("judge few good --pixel-um 0.3", "few: 1 field; expected at least 2"),
         ("judge good flat --pixel-um 0.3", "is constant"),
         ("judge sizes sizes --pixel-um 0.3", "the mask is 64 x 40 pixels, the image 64 x 48"),
         ("judge good broken --pixel-um 0.3", "b.png"),

@@ -381,7 +381,7 @@ fn submit_prints_scripts_and_rejects_invalid_arguments() {
         assert!(run.out.contains(part), "{part}: {}", run.out);
     }
     let run = bench.good("submit kubernetes --tasks 4 --image papsynth:1 -- --out /data/many --frames 2000");
-    for part in ["completions: 4", "backoffLimitPerIndex", "\"auto/4\"", "values: [2]"] {
+    for part in ["completions: 4", "backoffLimitPerIndex", "podFailurePolicy", "\"auto/4\"", "values: [2]"] {
         assert!(run.out.contains(part), "{part}: {}", run.out);
     }
     for wrong in [

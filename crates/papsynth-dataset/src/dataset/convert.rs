@@ -53,16 +53,17 @@ pub fn convert(
             continue;
         }
         let mut writer = target.shard_writer(shard)?;
-        for &(index, there) in frames {
-            if open.as_ref().is_none_or(|open: &OpenShard| open.record.shard != there) {
-                open = Some(OpenShard::open(&source, layout, there)?);
+        for &(index, source_shard) in frames {
+            // The frames of a source shard follow each other, so each shard is opened once.
+            if open.as_ref().is_none_or(|open: &OpenShard| open.record.shard != source_shard) {
+                open = Some(OpenShard::open(&source, layout, source_shard)?);
             }
             let Some(open) = &open else { continue };
             let frame = open.record.frames.iter().find(|frame| frame.index == index);
             let Some(frame) = frame else { continue };
             writer.begin_with(frame.clone())?;
             open.planes(frame, |plane| writer.write_plane(&plane))?;
-            let truth = source.truth_in(&open.document, there, index)?;
+            let truth = source.truth_in(&open.document, source_shard, index)?;
             report(Progress::Written(writer.end_with(&truth, open.edf(frame)?)?));
         }
         writer.commit()?;
@@ -150,7 +151,9 @@ impl<'a> OpenShard<'a> {
             let grey = levels(page, frame.channels);
             let noise_free = match &mut noise_free {
                 Some((path, pages)) => {
-                    pages.next().ok_or_else(|| Error::input(path)(InputError::unfit("has too few planes")))?
+                    let expected = frame.planes_um.len();
+                    let missing = || InputError::unfit(format!("planes: {index}; expected {expected}"));
+                    pages.next().ok_or_else(|| Error::input(path)(missing()))?
                 }
                 None => vec![0.0; frame.values()],
             };
@@ -168,6 +171,7 @@ impl<'a> OpenShard<'a> {
         };
         let read = pages(source, &name, frame, record.shard, &mut |page| {
             convert_page(page).map_err(|error| {
+                // Stops the reader; `failure` is returned instead.
                 failure = Some(error);
                 InputError::unfit("")
             })
@@ -192,16 +196,16 @@ impl<'a> OpenShard<'a> {
         Ok(levels(to_camera(image, frame.bits), frame.channels))
     }
 
-    /// Checks that a source of 8-bit images is not converted to a format with the bit depth of the camera. `uses` tells
-    /// whether a target format has these images.
+    /// Checks that a source of 8-bit images is not converted to a format with the bit depth of the camera. `uses`
+    /// returns whether a target format has these images.
     fn check_depth(&self, from: Format, frame: &FrameSummary, uses: impl Fn(Format) -> bool) -> Result<(), Error> {
         let deep = self.target.formats.iter().find(|format| format.depth() == Depth::Camera && uses(**format));
         match deep {
             Some(deep) if frame.bits > TRAINING_BITS && from.depth() == Depth::Training => refuse(
                 self.source,
                 format!(
-                    "the format `{}` needs {} bits, but `{}` has {TRAINING_BITS}; convert a data set with `folder`, `ome-tiff`, \
-                     `ome-zarr` or `qupath`, or run `papsynth generate` with the recipe",
+                    "the format `{}` needs {} bits, but `{}` has {TRAINING_BITS}; start from a data set that contains \
+                     `folder`, `ome-tiff`, `ome-zarr` or `qupath`, or run `papsynth generate` with the recipe",
                     deep.name(),
                     frame.bits,
                     from.name(),

@@ -13,7 +13,7 @@ use crate::error::Error;
 use crate::files::{Output, Pending};
 use crate::formats::parquet::Table;
 use crate::formats::{Field, Files, Sink, names};
-use crate::truth::{Document, FrameSummary, Image, Info, Row, leaves, table, typed_columns};
+use crate::truth::{Document, FrameSummary, Image, Info, Row, extends_beyond, table, typed_columns};
 
 impl Dataset {
     /// Starts a shard. Its existing record is removed.
@@ -272,7 +272,7 @@ impl OpenFrame {
         let ([w, h], [width, height]) = ([truth.width, truth.height], [frame.width, frame.height]);
         let other = format!("the ground truth is {w} x {h} px, the image {width} x {height} px");
         frame.due([w, h] == [width, height], other)?;
-        let outside = truth.objects.iter().find(|object| leaves(object, width, height));
+        let outside = truth.objects.iter().find(|object| extends_beyond(object, width, height));
         outside.map_or(Ok(()), |o| Err(frame.wrong(format!("the mask of object {} extends beyond the image", o.id))))
     }
 

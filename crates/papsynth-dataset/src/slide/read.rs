@@ -110,7 +110,11 @@ impl SlideSet {
         if rows.is_empty() || columns.is_empty() || rows.end > height || columns.end > width {
             return Err(Error::folder(
                 self.path(),
-                format!("rows {rows:?}, columns {columns:?}: outside the level of {width} x {height} px"),
+                format!(
+                    "rows {}, columns {}: expected a part of the level of {width} x {height} px",
+                    span(rows),
+                    span(columns)
+                ),
             ));
         }
         let mut values = vec![T::default(); rows.len() * columns.len()];
@@ -123,6 +127,11 @@ impl SlideSet {
         }
         Ok(values)
     }
+}
+
+/// Returns the first and last index of a range, for messages.
+fn span(range: &Range<usize>) -> String {
+    if range.is_empty() { "none".to_owned() } else { format!("{} to {}", range.start, range.end - 1) }
 }
 
 /// Splits rows and columns by shards of `side` pixels. Returns column and row of each shard with its rows and columns.

@@ -61,7 +61,7 @@ impl Image {
 /// An object or part of a cell: the fields of COCO, and the other ground truth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Annotation {
-    /// Number from 1 in the document: that of a shard, or the merged one of all frames.
+    /// Number in the document, from 1. The document is that of a shard, or the merged one of all frames.
     pub(crate) id: u64,
     pub(crate) image_id: u64,
     pub(crate) category_id: u32,
@@ -129,10 +129,10 @@ impl Annotation {
         }
     }
 
-    /// Returns the annotation with `ids` added to its ids.
-    pub(crate) fn renumbered(self, ids: u64) -> Self {
-        let parent_id = self.parent_id.map(|parent| parent.saturating_add(ids));
-        Self { id: self.id.saturating_add(ids), parent_id, ..self }
+    /// Returns the annotation with `offset` added to its id and to that of its parent.
+    pub(crate) fn renumbered(self, offset: u64) -> Self {
+        let parent_id = self.parent_id.map(|parent| parent.saturating_add(offset));
+        Self { id: self.id.saturating_add(offset), parent_id, ..self }
     }
 
     /// Returns the group and the complete mask.
@@ -146,27 +146,31 @@ impl Annotation {
     /// If a mask is invalid, or differs from its box or areas.
     pub(crate) fn object(&self) -> Result<ObjectTruth, InputError> {
         let (amodal, visible) = (self.segmentation.mask()?, self.visible.mask()?);
-        let wrong =
-            |what: &str| InputError::broken("COCO", format!("annotation {}: {what} differs from the mask", self.id));
-        let claims: [(&str, bool); 4] = [
-            ("area", self.area == amodal.area()),
-            ("bbox", self.bbox == box_of(&amodal)),
-            ("visible_area", self.visible_area == visible.area()),
-            ("centroid", self.centroid == amodal.centroid()),
-        ];
-        if let Some((what, _)) = claims.into_iter().find(|(_, holds)| !holds) {
-            return Err(wrong(what));
+        let wrong = |what: String| Err(InputError::broken("COCO", format!("annotation {}: {what}", self.id)));
+        if self.area != amodal.area() {
+            return wrong(format!("area is {}, but the mask has {} pixels", self.area, amodal.area()));
         }
-        let unknown = |what: &str, found: &str| {
-            InputError::broken("COCO", format!("annotation {}: unknown {what} `{}`", self.id, found.escape_default()))
+        if self.bbox != box_of(&amodal) {
+            return wrong(format!("bbox is {:?}, but that of the mask is {:?}", self.bbox, box_of(&amodal)));
+        }
+        if self.visible_area != visible.area() {
+            let (stated, found) = (self.visible_area, visible.area());
+            return wrong(format!("visible_area is {stated}, but the visible mask has {found} pixels"));
+        }
+        if self.centroid != amodal.centroid() {
+            return wrong("centroid differs from that of the mask".to_owned());
+        }
+        let unknown = |what: &str, found: &str, accepted: &[&str]| {
+            let (found, accepted) = (found.escape_default(), accepted.join(", "));
+            InputError::broken("COCO", format!("annotation {}: unknown {what} `{found}`; expected {accepted}", self.id))
         };
         let kind = ObjectKind::ALL.into_iter().find(|kind| kind.name() == self.kind);
-        let tint =
-            (!self.tint.is_empty()).then(|| Tint::by_name(&self.tint).ok_or_else(|| unknown("tint", &self.tint)));
+        let tint = (!self.tint.is_empty())
+            .then(|| Tint::by_name(&self.tint).ok_or_else(|| unknown("tint", &self.tint, &Tint::ALL.map(Tint::name))));
         Ok(ObjectTruth {
             id: self.object_id,
             part: self.part,
-            kind: kind.ok_or_else(|| unknown("kind", &self.kind))?,
+            kind: kind.ok_or_else(|| unknown("kind", &self.kind, &ObjectKind::ALL.map(ObjectKind::name)))?,
             class: self.class.clone(),
             bethesda: self.bethesda.clone(),
             traits: self.traits.clone(),
@@ -187,7 +191,7 @@ impl Annotation {
 }
 
 /// Whether a mask of an object extends beyond an image of this size.
-pub(crate) fn leaves(object: &ObjectTruth, width: usize, height: usize) -> bool {
+pub(crate) fn extends_beyond(object: &ObjectTruth, width: usize, height: usize) -> bool {
     let bounds = [&object.amodal, &object.visible].into_iter().filter_map(Mask::bounds);
     bounds.into_iter().any(|b| (b.x + b.width) as usize > width || (b.y + b.height) as usize > height)
 }
@@ -267,7 +271,7 @@ impl Document {
             .ok_or_else(|| InputError::broken("COCO", format!("the document has no image {index}")))?;
         let of_frame = self.annotations.iter().filter(|annotation| annotation.image_id == index);
         let objects: Vec<ObjectTruth> = of_frame.map(Annotation::object).collect::<Result<_, _>>()?;
-        match objects.iter().find(|object| leaves(object, image.width, image.height)) {
+        match objects.iter().find(|object| extends_beyond(object, image.width, image.height)) {
             Some(object) => {
                 let message = format!("image {index}: the mask of object {} extends beyond the image", object.id);
                 Err(InputError::broken("COCO", message))

@@ -9,7 +9,7 @@ mod splits;
 mod table;
 
 pub use coco::truths;
-pub(crate) use coco::{Annotation, Document, Image, Info, leaves};
+pub(crate) use coco::{Annotation, Document, Image, Info, extends_beyond};
 pub(crate) use frame::categories;
 #[cfg(feature = "zarr")]
 pub(crate) use frame::category_name;

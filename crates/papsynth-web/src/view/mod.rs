@@ -50,6 +50,7 @@ impl Viewer {
         self.kind
     }
 
+    /// Returns the reply to a request. `Err` contains a reply with an error status.
     fn answer(&mut self, target: &str) -> Result<Reply, Reply> {
         let words: Vec<&str> = target.split('/').skip(1).take(7).collect();
         match words[..] {
@@ -63,10 +64,12 @@ impl Viewer {
                 self.source.tile(number(image)?, number(plane)?, place(level, name)?)
             }
             ["label", image, group, level, name] => {
-                let group = Group::ALL.into_iter().find(|known| known.name() == group);
-                let group = group
-                    .ok_or_else(|| Reply::error(404, "unknown label group: expected cytoplasm, nucleus or debris"))?;
-                self.source.label(number(image)?, group, place(level, name)?)
+                let Some(known) = Group::ALL.into_iter().find(|known| known.name() == group) else {
+                    let group = group.escape_default();
+                    let message = format!("unknown label group `{group}`; expected cytoplasm, nucleus or debris");
+                    return Err(Reply::error(404, &message));
+                };
+                self.source.label(number(image)?, known, place(level, name)?)
             }
             ["at", image, x, y] => {
                 let (image, x, y) = (number(image)?, number(x)?, number(y)?);
@@ -98,7 +101,11 @@ fn source(path: &Path) -> Result<(&'static str, Box<dyn Source>), Error> {
         return slide(path);
     }
     if !path.join("manifest.json").is_file() {
-        let what = if path.is_dir() { "contains neither a data set nor a slide" } else { "no such folder" };
+        let what = match (path.is_dir(), path.exists()) {
+            (true, _) => "contains neither a data set nor a slide",
+            (false, true) => "is a file",
+            (false, false) => "no such folder",
+        };
         return Err(folder(
             path,
             format!("{what}; expected a folder that `papsynth generate` or `papsynth slide make` wrote"),
@@ -137,12 +144,13 @@ fn slide(path: &Path) -> Result<(&'static str, Box<dyn Source>), Error> {
 fn number(word: &str) -> Result<usize, Reply> {
     let is_number = (1..=9).contains(&word.len()) && word.bytes().all(|byte| byte.is_ascii_digit());
     let number = if is_number { word.parse().ok() } else { None };
-    number.ok_or_else(|| Reply::error(400, "expected a number of 1 to 9 digits"))
+    number.ok_or_else(|| Reply::error(400, &format!("`{}`: expected a number of 1 to 9 digits", word.escape_default())))
 }
 
 /// Parses a level and `ROW-COLUMN.png`.
 fn place(level: &str, name: &str) -> Result<TileIndex, Reply> {
-    let name = name.strip_suffix(".png").and_then(|name| name.split_once('-'));
-    let (row, column) = name.ok_or_else(|| Reply::error(400, "expected ROW-COLUMN.png"))?;
+    let Some((row, column)) = name.strip_suffix(".png").and_then(|name| name.split_once('-')) else {
+        return Err(Reply::error(400, &format!("`{}`: expected ROW-COLUMN.png", name.escape_default())));
+    };
     Ok(TileIndex { level: number(level)?, row: number(row)?, column: number(column)? })
 }

@@ -218,8 +218,8 @@ fn wrong_indices_and_oversized_chunks_are_refused() {
         assert!(matches!(error, Error::Damaged { .. }) && error.to_string().contains(what), "{error}");
     };
     says(with_index(&bytes, |index| index[..2].fill(u64::MAX)), "chunk 0 is missing");
-    says(with_index(&bytes, |index| index[0] = u64::MAX - 1), "in the index");
-    says(with_index(&bytes, |index| index[1] = 1 << 60), "in the index");
+    says(with_index(&bytes, |index| index[0] = u64::MAX - 1), "the index gives bytes ");
+    says(with_index(&bytes, |index| index[1] = 1 << 60), "the index gives bytes ");
     says(with_index(&bytes, |index| index[1] -= 1), "do not belong to a chunk");
     // A chunk that overlaps the next.
     says(with_index(&bytes, |index| index[1] += 1), "more bytes than the file");

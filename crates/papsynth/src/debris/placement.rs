@@ -15,9 +15,9 @@ pub(crate) struct Field<'a> {
     pub(crate) region: Region,
     pub(crate) numbers: &'a FieldNumbers,
     pub(crate) stain: &'a FieldStain<'a>,
-    /// Cells; the first `inside` have their centres in the field, the others in the margin.
+    /// Cells; the first `cells_in_field` have their centres in the field, the others in the margin.
     pub(crate) cells: Vec<CellPosition>,
-    pub(crate) inside: usize,
+    pub(crate) cells_in_field: usize,
     /// On a slide: the density of debris in one plot.
     pub(crate) plot_density: Option<PlotDensity<'a>>,
 }
@@ -122,7 +122,7 @@ impl<'a, T> KindPlacer<'a, T> {
 
     /// Returns the cells in that region.
     fn cells(&self) -> &[CellPosition] {
-        if self.in_margin { &self.field.cells } else { &self.field.cells[..self.field.inside] }
+        if self.in_margin { &self.field.cells } else { &self.field.cells[..self.field.cells_in_field] }
     }
 
     /// Returns the random stream of one object of the kind for a purpose.

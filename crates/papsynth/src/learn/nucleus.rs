@@ -66,7 +66,7 @@ impl NucleusImage {
             .map(|i| f64::from(self.light[i]))
             .collect();
         if around.len() < MIN_PIXELS {
-            return Err(NucleusError::Crop(around.len()));
+            return Err(NucleusError::Crop(around.len(), MIN_PIXELS));
         }
         around.sort_by(f64::total_cmp);
         let surroundings = around[around.len() / 2];

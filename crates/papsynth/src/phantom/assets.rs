@@ -38,10 +38,10 @@ pub(crate) struct Cytoskeletons {
     tori: [OnceLock<Torus>; TORI],
 }
 
-/// Number of diagrams. A cell uses a quarter of one, at a random position and rotation and with random edge weights.
+/// Number of diagrams. A cell uses a quarter of a diagram, with random position, rotation and edge weights.
 const TORI: usize = 4;
 
-/// Sites per diagram: with 300 per cell, enough for a cell three times as long as wide.
+/// Sites per diagram. A cell uses 300 of them, enough for a cell three times as long as wide.
 const TORUS_SITES: usize = 1200;
 
 /// Data for drawing the cells of one class.
@@ -125,7 +125,7 @@ impl ClassAssets {
     }
 }
 
-/// Largest elongation: half axes of 1.8 and 0.2.
+/// Largest elongation: the half axes are 1.8 and 0.2 of the radius.
 const MAX_ELONGATION: f64 = 0.8;
 
 /// Aligns a drawn shape with its long axis along x and applies the outline form of its class.
@@ -140,6 +140,7 @@ fn formed(drawn: &Descriptors, form: &OutlineForm, rng: &mut Stream) -> Descript
     let mut terms = aligned.as_slice().to_vec();
     for (index, term) in terms.iter_mut().enumerate() {
         match (index.abs_diff(centre), index < centre) {
+            // Position and radius.
             (0, _) | (1, false) => {}
             (1, true) => {
                 if let Some(elongation) = elongation {
@@ -175,7 +176,8 @@ fn quilt(recipe: &Recipe, class: &CellClass, pixel_um: f64) -> QuiltParams {
         patch_px: patch_px.max(2 * overlap_px),
         overlap_px,
         acceptance: match nucleus.acceptance {
-            // DonorSet are scaled to a standard deviation of 1; the threshold is scaled with them.
+            // The donors are scaled to a standard deviation of 1, so the threshold is divided by the standard deviation
+            // of the class.
             Acceptance::Threshold => quilt_texture::Acceptance::Threshold {
                 d_max: midpoint(&nucleus.d_max) / class.nucleus.chromatin.sd.mean.max(1e-6),
                 max_tries: MAX_TRIES,

@@ -18,13 +18,13 @@ use super::stain::FieldStain;
 use super::view::{FieldNumbers, Region, View};
 use super::weight::WeightMap;
 
-/// Number of draws of the objects of a field before cells that do not fit are left out.
+/// Maximum number of draws of the objects of a field. The last draw leaves out cells that do not fit.
 pub const MAX_ATTEMPTS: u32 = 8;
 
 /// Draws the objects of a field and how it is imaged.
 ///
 /// `weight_map` is the image at the `path` of the layout, if it has one. If the cells do not fit, the objects are drawn
-/// again, up to [`MAX_ATTEMPTS`] times; the last time as many cells are placed as fit.
+/// again, with at most [`MAX_ATTEMPTS`] draws in total. The last draw leaves out cells that do not fit.
 ///
 /// # Errors
 /// If no draw can succeed: the weight map is missing or too uneven, or there are more objects than labels can number.
@@ -53,16 +53,17 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
         let crowding = if attempt + 1 < MAX_ATTEMPTS { Crowding::Error } else { Crowding::LeaveOut };
         drawn = draw_cells(attempt, crowding);
     }
-    let (attempt, numbers, Cells { mut objects, field: inside, region, counts }) = drawn.map_err(fail)?;
-    strew(&recipe.debris, [inside, region], &numbers, &stain, None, &mut objects);
+    let (attempt, numbers, Cells { mut objects, field: area, region, counts }) = drawn.map_err(fail)?;
+    add_debris(&recipe.debris, [area, region], &numbers, &stain, None, &mut objects);
+    // Objects of a density are kept only if their blurred image touches the field.
     objects.retain(|object| {
         let abundance = match &object.body {
             Body::Cell(cell) => recipe.cells.get(&cell.class).map(|mix| &mix.count),
             other => recipe.debris.abundance(other.kind()),
         };
-        // Light of an object out of focus spreads by about its depth.
+        // The blur of an object out of focus has about the radius of its depth.
         let reach_um = object.body.reach_um(view.pixel_um) + object.depth_um.abs();
-        !abundance.is_some_and(Abundance::is_density) || inside.touches(object.centre_um, reach_um)
+        !abundance.is_some_and(Abundance::is_density) || area.touches(object.centre_um, reach_um)
     });
     if u32::try_from(objects.len()).is_err() {
         return Err(fail(ErrorKind::TooManyObjects(objects.len())));
@@ -74,9 +75,9 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
     Ok(Scene { objects, slide, attempts: attempt + 1, cells: counts, ..empty(recipe, view, &field, &stain) })
 }
 
-/// Draws the coats of the clue cells, and adds the debris, in the field or in the field with its margin. `plot_density`
-/// selects the objects of a part of a slide.
-pub(super) fn strew(
+/// Adds debris to the objects in the field and its margin, and draws the bacteria on clue cells. On a slide,
+/// `plot_density` selects the debris of one plot.
+pub(super) fn add_debris(
     debris: &Debris,
     [field, region]: [Region; 2],
     numbers: &FieldNumbers,
@@ -94,9 +95,9 @@ pub(super) fn strew(
     };
     let is_inside = |cell: &CellPosition| field.touches(cell.centre_um, 0.0);
     let (mut cells, outside): (Vec<_>, Vec<_>) = objects.iter().filter_map(place).partition(is_inside);
-    let inside = cells.len();
+    let cells_in_field = cells.len();
     cells.extend(outside);
-    let placed = debris.draw(&Field { field, region, numbers, stain, cells, inside, plot_density });
+    let placed = debris.draw(&Field { field, region, numbers, stain, cells, cells_in_field, plot_density });
     objects.extend(placed.into_iter().map(|PlacedObject { number, cluster, placement, body }| Object {
         id: 0,
         number,

@@ -16,7 +16,7 @@ const PITCH_UM: f64 = 4.0;
 /// Largest number of pixels along a side of a weight map.
 const MOST_PIXELS: usize = 2048;
 
-/// Width of the margin of a field, µm: about the largest radius of most cells.
+/// Width of the margin of a field, µm: about the largest radius of common cells.
 pub(crate) const MARGIN_UM: f64 = 60.0;
 
 /// Largest accepted number of expected tries for a field.
@@ -28,8 +28,8 @@ const JAMMED: f64 = 0.547;
 
 /// Weights of the places of a field, and of a margin around it.
 ///
-/// Objects of a density also have centres in the margin, so that the coverage at the border of the image is that of its
-/// centre.
+/// Objects whose number is a density (`per_mm2`) are also placed in the margin. Then the mean coverage at the border of
+/// the image is the same as at its centre.
 pub(super) struct Weights {
     /// The field.
     pub(super) field: Region,
@@ -97,7 +97,7 @@ pub(super) fn weights(
     let populated_mm2 = if is_stationary {
         region.area_mm2()
     } else {
-        // So that the mean density within the field is that of the recipe.
+        // Makes the mean density in the field that of the recipe.
         field.area_mm2() * sum(&of_region) / sum(&of_field).max(f64::MIN_POSITIVE)
     };
     Ok(Weights { field, region, of_field, of_region, populated_mm2 })
@@ -111,8 +111,9 @@ fn cluster_map(
     [width, height]: [usize; 2],
     numbers: &FieldNumbers,
 ) -> WeightMap {
-    /// Distance beyond the margin at which clusters still have centres, in their largest radius, and at most.
+    /// Distance beyond the margin up to which clusters have centres, in largest radii.
     const RADII: f64 = 2.0;
+    /// Largest distance beyond the margin at which clusters have centres, µm.
     const FARTHEST_UM: f64 = 500.0;
     let area = if layout.count.is_density() {
         region.with_margin([(RADII * layout.radius_um.bounds()[1]).min(FARTHEST_UM); 2])
@@ -137,7 +138,7 @@ fn cluster_map(
     WeightMap { width, weights: distances.iter().map(weight).collect() }
 }
 
-/// The part of a map that starts at a column and a row; even if all its weights are zero.
+/// Returns the part of a map that starts at a column and a row. If all its weights are zero, returns a uniform map.
 fn cropped(map: &WeightMap, first: [usize; 2], size: [usize; 2]) -> WeightMap {
     let rows = map.weights.chunks_exact(map.width).skip(first[1]).take(size[1]);
     let weights: Vec<f32> = rows.flat_map(|row| &row[first[0]..first[0] + size[0]]).copied().collect();
@@ -214,18 +215,19 @@ impl Places {
     fn room(&self, in_margin: bool) -> f64 {
         let disc = core::f64::consts::FRAC_PI_4 * self.spacing_um * self.spacing_um;
         let area = self.area_um2(in_margin);
-        // A cell at the edge of the possible places takes only part of its disc from them.
+        // Only a part of the disc of a cell at the edge of the area is inside the area.
         let margin = 1.0 + self.spacing_um / area.sqrt();
         if disc > 0.0 { (JAMMED * area * margin * margin / disc).max(1.0) } else { f64::INFINITY }
     }
 
-    /// Area where cells may lie, µm².
+    /// Returns the area in which cells may have their centres, µm².
     fn area_um2(&self, in_margin: bool) -> f64 {
         let (sampler, region) = &self.areas[usize::from(in_margin)];
         region.size_um[0] * region.size_um[1] * sampler.possible_share()
     }
 
-    /// Returns the number of cells in the field, of those in the field and of those in the field and its margin.
+    /// Returns the expected number of cells in the field, if `in_field` cells are placed in the field and `in_both`
+    /// cells in the field and its margin.
     fn count_in_field(&self, in_field: usize, in_both: usize) -> f64 {
         in_field as f64 + in_both as f64 * (self.area_um2(false) / self.area_um2(true)).min(1.0)
     }

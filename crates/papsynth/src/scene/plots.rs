@@ -12,7 +12,7 @@ use perlin_bg::{Fractal, FractalParams};
 use rand_core::Rng;
 
 use super::cells::{Class, Drawn};
-use super::draw::{empty, pixel_um, strew};
+use super::draw::{add_debris, empty, pixel_um};
 use super::field::{Object, Plot, Scene};
 use super::groups::Groups;
 use super::stain::FieldStain;
@@ -292,7 +292,7 @@ impl Population {
         };
         // Objects on the glass are not rejected, so that they need no additional tries.
         let plot_density = PlotDensity { area_in_fields: self.share, max_density: DENSEST, keep_probability: &stays };
-        strew(&self.recipe.debris, [region; 2], &field, &stain, Some(plot_density), &mut objects);
+        add_debris(&self.recipe.debris, [region; 2], &field, &stain, Some(plot_density), &mut objects);
         let most = (1 << OBJECT_BITS) - 2;
         if objects.len() > most {
             return Err(ErrorKind::FullPlot { side_px: PLOT_PX, found: objects.len(), most });

@@ -39,7 +39,7 @@ pub(crate) struct BrightFieldPath {
     overlaps: Option<Overlaps>,
     /// Patches of each object, if several planes use them.
     cached_patches: Option<Vec<Mutex<Option<ObjectPatches>>>>,
-    free_buffers: Mutex<Vec<PatchBuffers>>,
+    spare_buffers: Mutex<Vec<PatchBuffers>>,
 }
 
 /// The transmittance of an object, transformed for imaging at any focus.
@@ -94,7 +94,7 @@ impl BrightFieldPath {
             overlaps: matches!(scene.light, SceneLight::Colour { mixing: Mixing::Spectral, .. })
                 .then(|| Overlaps::new(specimen)),
             groups,
-            free_buffers: Mutex::default(),
+            spare_buffers: Mutex::default(),
         })
     }
 
@@ -190,7 +190,7 @@ impl BrightFieldPath {
                     *clipped_px += factor.clipped;
                     absorbances.extend(own);
                 }
-                self.free_buffers().push(object_factors.buffers);
+                self.spare_buffers().push(object_factors.buffers);
                 Ok::<_, ErrorKind>(())
             },
         )?;
@@ -247,7 +247,7 @@ impl BrightFieldPath {
         if !window.meets(grid.width, grid.height, margin_px * n) {
             return Ok(None);
         }
-        let mut buffers = self.free_buffers().pop().unwrap_or_default();
+        let mut buffers = self.spare_buffers().pop().unwrap_or_default();
         let PatchBuffers { transmission, object_patches, scratch, factors, refocused } = &mut buffers;
         let mut cached_patches = self
             .cached_patches
@@ -312,8 +312,8 @@ impl BrightFieldPath {
         }
     }
 
-    fn free_buffers(&self) -> MutexGuard<'_, Vec<PatchBuffers>> {
-        self.free_buffers.lock().unwrap_or_else(PoisonError::into_inner)
+    fn spare_buffers(&self) -> MutexGuard<'_, Vec<PatchBuffers>> {
+        self.spare_buffers.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

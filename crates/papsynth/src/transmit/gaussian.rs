@@ -17,8 +17,8 @@ use crate::threads;
 /// Standard deviation below which a Gaussian changes nothing visible in 16 bits, px.
 const SHARP_PX: f64 = 0.03;
 
-/// Fraction of an object's absorbance in the truncated tails of its blur. The largest error is ten times this value,
-/// which is the tolerance of the decimated blur.
+/// Fraction of the absorbance of an object in the truncated tails of its blur. The largest error is ten times this
+/// value, the tolerance of the decimated blur.
 const LOST_TAIL: f64 = 1e-4;
 
 /// The same for the blur in the image plane, which affects all light.
@@ -32,7 +32,7 @@ pub(crate) struct GaussianPath {
     px_per_um: f64,
     /// Wavelength of the light, µm.
     wavelength_um: f64,
-    free_buffers: Mutex<SpareBuffers>,
+    spare_buffers: Mutex<SpareBuffers>,
 }
 
 /// Buffers for blurred tiles, reused from object to object.
@@ -48,7 +48,7 @@ struct Blurred<'a> {
     tile: Option<Cow<'a, Tile>>,
     /// Mean over the mask of the piece.
     mean: f64,
-    /// Absorbance of its dyes at this wavelength, relative to the tile.
+    /// Factor of the tile: the absorbance of the dyes of the piece at this wavelength.
     strength: f32,
 }
 
@@ -62,10 +62,10 @@ impl GaussianPath {
         };
         let px_per_um = sigma_z_um_per_um / view.pixel_um;
         let frame = Window { origin: [0, 0], width: view.width, height: view.height };
-        Ok(Self { frame, in_plane, px_per_um, wavelength_um, free_buffers: Mutex::default() })
+        Ok(Self { frame, in_plane, px_per_um, wavelength_um, spare_buffers: Mutex::default() })
     }
 
-    /// Computes the absorbance I_p of the phantoms in the channel of `light`.
+    /// Adds the absorbance I_p of the phantoms to the channel of `light`.
     pub(super) fn transmit(
         &self,
         specimen: Specimen<'_>,
@@ -93,7 +93,7 @@ impl GaussianPath {
                 let Some(tile) = piece.tile else { continue };
                 add(&mut light.channels[0], self.frame, &tile, piece.strength);
                 if let Cow::Owned(tile) = tile {
-                    self.free_buffers().tiles.push(tile.values);
+                    self.spare_buffers().tiles.push(tile.values);
                 }
             }
             Ok::<_, ErrorKind>(())
@@ -113,10 +113,10 @@ impl GaussianPath {
         let tile = match gaussian {
             None => Cow::Borrowed(tile),
             Some(gaussian) => {
-                let values = self.free_buffers().tiles.pop().unwrap_or_default();
-                let mut scratch = self.free_buffers().scratches.pop().unwrap_or_default();
+                let values = self.spare_buffers().tiles.pop().unwrap_or_default();
+                let mut scratch = self.spare_buffers().scratches.pop().unwrap_or_default();
                 let tile = blurred_tile(tile, gaussian, values, &mut scratch);
-                self.free_buffers().scratches.push(scratch);
+                self.spare_buffers().scratches.push(scratch);
                 Cow::Owned(tile)
             }
         };
@@ -131,7 +131,7 @@ impl GaussianPath {
         Ok(gaussian.transpose()?)
     }
 
-    fn free_buffers(&self) -> MutexGuard<'_, SpareBuffers> {
-        self.free_buffers.lock().unwrap_or_else(PoisonError::into_inner)
+    fn spare_buffers(&self) -> MutexGuard<'_, SpareBuffers> {
+        self.spare_buffers.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

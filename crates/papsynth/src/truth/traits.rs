@@ -46,7 +46,7 @@ pub struct Traits(BTreeSet<Trait>);
 
 /// Error: a string is not the name of a [`Trait`].
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("unknown trait `{}`", .0.escape_default())]
+#[error("unknown trait `{}`; expected {}", .0.escape_default(), Trait::ALL.map(Trait::name).join(", "))]
 pub struct UnknownTrait(String);
 
 impl Traits {

@@ -110,8 +110,8 @@ pub fn open_unit(word: u32) -> f32 {
 }
 
 /// Returns two independent standard normal numbers for each pair of words: Box and Muller's r·cos φ and r·sin φ
-/// (doi:10.1214/aoms/1177706645) with r² = -2 ln u, u = (word + ½)·2⁻³² and φ any of 2³² angles. The largest is 6.76;
-/// the error is below 3e-7 of r. Inlined, so that it is compiled for the caller's instruction set.
+/// (doi:10.1214/aoms/1177706645) with r² = -2 ln u, u = (word + ½)·2⁻³² and φ any of 2³² angles. The largest number is
+/// 6.76; the error is below 3e-7 of r. Inlined, so that it is compiled for the caller's instruction set.
 #[inline(always)]
 #[must_use]
 pub fn normals_of_words<const N: usize>(radii: &[u32; N], angles: &[u32; N]) -> [[f32; N]; 2] {
@@ -205,7 +205,7 @@ mod tests {
             let (sine, cosine) = libm::sincos(f64::from(angle) * core::f64::consts::TAU / 4_294_967_296.0);
             for ([found], exact_part) in normals_of_words(&[word], &[angle]).iter().zip([exact * cosine, exact * sine])
             {
-                // Near u = 1 single precision has steps of 2⁻²⁴ in u, which are small in r times its density, r.
+                // Near u = 1, u has steps of 2⁻²⁴ in single precision, and r has steps of about 2⁻²⁴ / r.
                 let error = (f64::from(*found) - exact_part).abs();
                 assert!(error < 3e-7 * exact + 2e-7 / exact, "{word} {angle}: {error}");
             }

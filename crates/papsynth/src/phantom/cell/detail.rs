@@ -11,7 +11,7 @@ use crate::phantom::parametric_shape::perturbed_circle;
 use crate::phantom::tile::{Point, Tile, scaled_about};
 use crate::random;
 
-/// Radius of a granule, µm (standard deviation of its absorbance).
+/// Standard deviation of the absorbance profile of a granule, µm.
 const GRANULE_UM: f64 = 0.28;
 
 /// Absorbance of a granule relative to the cytoplasm.
@@ -51,7 +51,7 @@ pub(super) fn add_detail(absorbance: &mut Tile, coverage: &Tile, cell: &CellCont
     }
 }
 
-/// Adds a field, or its excess above a threshold.
+/// Adds `strength` times a field, or times its excess above a threshold.
 #[multiversion(targets = "simd")]
 fn add_above(factor: &mut [f32], field: &[f32], strength: f32, threshold: Option<f32>) {
     let zero = threshold.unwrap_or(0.0);
@@ -91,10 +91,10 @@ pub(super) fn add_cytoskeleton(
     }
     let origin = absorbance.origin.map(|o| o as f64);
     let local: Vec<Point> = outline.iter().map(|p| [p[0] - origin[0], p[1] - origin[1]]).collect();
-    let rivers = cell.assets.cytoskeletons.grow(&local, rng)?;
+    let fibres = cell.assets.cytoskeletons.grow(&local, rng)?;
     let mut lines = vec![0.0; absorbance.values.len()];
     let line = LineParams { width_px: (FIBRE_UM / cell.pixel_um()).max(1.0), ..LineParams::default() };
-    draw_into(&mut lines, absorbance.width, &rivers, &line)?;
+    draw_into(&mut lines, absorbance.width, &fibres, &line)?;
     for (value, line) in absorbance.values.iter_mut().zip(&lines) {
         *value += strength as f32 * line;
     }
@@ -160,7 +160,7 @@ pub(super) fn thin_rim(absorbance: &mut Tile, coverage: &Tile, distance_px: f64)
     if radius == 0 {
         return;
     }
-    // At a straight rim the mean coverage over a box is 0.5, and 1 at one radius inside.
+    // At a straight rim, the mean coverage of a box is 0.5. One radius inside the rim, it is 1.
     let width = coverage.width;
     let mut across = vec![0.0; coverage.values.len()];
     sums_across(&coverage.values, width, radius, &mut across);
@@ -184,6 +184,7 @@ fn add_row(sums: &mut [f32], row: &[f32], sign: f32) {
     }
 }
 
+/// Multiplies values by a factor that increases from 0 at the rim to 1 at one radius inside.
 #[multiversion(targets = "simd")]
 fn thin(values: &mut [f32], sums: &[f32], weight: f32) {
     for (value, sum) in values.iter_mut().zip(sums) {
