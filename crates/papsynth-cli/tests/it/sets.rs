@@ -252,9 +252,11 @@ fn files_of_others_are_not_replaced() {
     let tile = format!("slide tile --at 0,0 --size 64,64 --out recipe.toml {TINY}");
     let run = bench.run(&tile);
     assert!(run.code == 2 && run.err.contains("recipe.toml"), "{}", run.err);
-    for (out, why) in
-        [("s3:/bucket/set", "write s3://bucket/set"), ("recipe.toml", "expected a folder, found a file"), ("recipe.toml/set", "recipe.toml")]
-    {
+    for (out, why) in [
+        ("s3:/bucket/set", "write s3://bucket/set"),
+        ("recipe.toml", "expected a folder, found a file"),
+        ("recipe.toml/set", "recipe.toml"),
+    ] {
         let run = bench.run(&format!("generate --out {out} --frames 1 {TINY}"));
         assert!(run.code == 2 && run.err.contains(why), "{out}: {}", run.err);
     }

@@ -343,7 +343,10 @@ fn inconsistent_input_is_refused_and_writes_no_frame() {
     scene = good.finished.scene.clone();
     scene.planes_um.clear();
     refused(dataset.shard_writer(0).unwrap().begin(&scene).unwrap_err(), "planes 0");
-    refused(dataset.shard_writer(1).unwrap().begin(&good.finished.scene).unwrap_err(), "shard 1 contains frames 1 to 1");
+    refused(
+        dataset.shard_writer(1).unwrap().begin(&good.finished.scene).unwrap_err(),
+        "shard 1 contains frames 1 to 1",
+    );
     refused(begin().commit().unwrap_err(), "is not finished");
     assert!(dataset.complete_record(0, Check::Sizes).unwrap().is_none());
     assert_eq!(dataset.finish().unwrap().frames, 0);
