@@ -79,8 +79,11 @@ const NEED_ALL_PARTS: &[&str] = &["merge", "slide finalize"];
 /// Commands that serve a page until they are interrupted.
 const SERVERS: &[&str] = &["view", "study real"];
 
-/// What a reader brings, by its name in a command, and what makes it.
-const FIXTURES: &[(&str, fn(&Bench, &str))] = &[
+/// A function that writes a fixture of this name.
+type Make = fn(&Bench, &str);
+
+/// Files and folders of users, by their names in commands.
+const FIXTURES: &[(&str, Make)] = &[
     ("cells.csv", |bench, name| fs::write(bench.path(name), outlines(12, 100, 80.0)).unwrap()),
     ("darks", |bench, name| exposures(bench, name, &[0.0])),
     ("dense.toml", |bench, name| drop(bench.good(&format!("init --preset dense --out {name}")))),
@@ -114,7 +117,8 @@ fn planes(bench: &Bench, name: &str) {
     let stages: Vec<f64> = (-6..=6).map(|k| 0.5 * f64::from(k)).collect();
     for (k, plane) in bright_field(0.41, &stages, nucleus(3)).iter().enumerate() {
         let level = |x: u32, y: u32| grey(200.0 * f64::from(plane[y as usize * SIDE + x as usize]));
-        bench.grey_png(&format!("{name}/{k}.png"), SIDE as u32, SIDE as u32, level);
+        let side = u32::try_from(SIDE).unwrap();
+        bench.grey_png(&format!("{name}/{k}.png"), side, side, level);
     }
 }
 
@@ -141,7 +145,8 @@ fn exposures(bench: &Bench, name: &str, electrons: &[f32]) {
             camera.expose_window(&vec![light; SIDE * SIDE], SIDE, [0, 0], (2 * k + frame) as u64, &mut levels);
             let file = fs::File::create(bench.path(name).join(format!("{k}{letter}.tif"))).unwrap();
             let mut encoder = TiffEncoder::new(file).unwrap();
-            encoder.write_image::<colortype::Gray16>(SIDE as u32, SIDE as u32, &levels).unwrap();
+            let side = u32::try_from(SIDE).unwrap();
+            encoder.write_image::<colortype::Gray16>(side, side, &levels).unwrap();
         }
     }
 }
@@ -256,7 +261,7 @@ impl Page {
             shrink(&mut line.words, smaller);
         }
         self.bring(&line.words);
-        if NEED_ALL_PARTS.iter().any(|command| starts(command)) {
+        if NEED_ALL_PARTS.iter().any(starts) {
             self.run_parts();
         }
         if let Some(at) = line.words.iter().position(|word| PARTS.contains(&word.as_str())) {

@@ -179,8 +179,8 @@ fn shard_of(path: &str, dataset: &Dataset) -> Option<u64> {
         return None;
     }
     // Numbers of frames and shards have at least 6 digits.
-    let numbers = name.split(|c: char| !c.is_ascii_digit()).filter(|digits| digits.len() >= 6);
-    let number: u64 = numbers.last()?.parse().ok()?;
+    let mut numbers = name.split(|c: char| !c.is_ascii_digit()).filter(|digits| digits.len() >= 6);
+    let number: u64 = numbers.next_back()?.parse().ok()?;
     Some(if is_of_shard { number } else { number / dataset.layout.frames_per_shard })
 }
 

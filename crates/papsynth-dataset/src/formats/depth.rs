@@ -52,7 +52,8 @@ mod tests {
             let scaled = to_training(&all, bits);
             assert_eq!((scaled[0], scaled[usize::from(full)]), (0, 255));
             for (level, scaled) in all.iter().zip(&*scaled) {
-                assert_eq!(*scaled, (f64::from(*level) * 255.0 / f64::from(full)).round() as u16, "{level} of {full}");
+                let expected = (f64::from(*level) * 255.0 / f64::from(full)).round();
+                assert_eq!(f64::from(*scaled), expected, "{level} of {full}");
             }
             let eight = LevelImage { width: 256, channels: 1, levels: (0..256).collect(), white: 255 };
             let deep = to_camera(eight.clone(), bits);
