@@ -59,10 +59,10 @@ pub(crate) fn generate<'py>(
     let dataset = dataset.map_err(|error| error::dataset(&error))?;
     let stop = AtomicBool::new(false);
     let check = if verify { Check::Hashes } else { Check::Sizes };
-    let share = Task { index, total: of };
+    let task = Task { index, total: count };
     let run = Run {
         frames: 0..frames,
-        task: share,
+        task,
         workers: threads,
         threads: Threads::One,
         check,

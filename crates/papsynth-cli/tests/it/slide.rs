@@ -88,7 +88,7 @@ fn a_slide_of_several_tasks_is_finalized_and_verified() {
     // The card states the command of the slide.
     let card = fs::read_to_string(bench.path("slide/README.md")).unwrap();
     let command = card.split('`').find(|words| words.starts_with("papsynth slide make")).unwrap();
-    let command = said.replace("recipe.toml", "slide/recipe.toml").replace("model.json", "slide/model.json");
+    let command = command.replace("recipe.toml", "slide/recipe.toml").replace("model.json", "slide/model.json");
     bench.good(command.strip_prefix("papsynth ").unwrap().replace("DIR", "again").as_str());
     assert_eq!(bench.files("slide"), bench.files("again"));
 }
