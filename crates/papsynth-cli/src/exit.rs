@@ -5,9 +5,8 @@ use std::fmt::{Display, Formatter};
 use std::io::{self, IsTerminal, Write, stderr};
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, mpsc};
-use std::time::Duration;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 
@@ -168,6 +167,9 @@ pub(crate) fn stop_flag() -> Result<&'static AtomicBool, ExitError> {
 /// Runs work that writes no files, and ends the program soon after a stop, even if the work does not notice it.
 #[cfg(feature = "judge")]
 pub(crate) fn until_stopped<T>(stop: &AtomicBool, work: impl FnOnce() -> T) -> T {
+    use std::sync::mpsc;
+    use std::time::Duration;
+
     /// Time that the work has to end by itself.
     const GRACE: Duration = Duration::from_millis(500);
     let (end, ended) = mpsc::channel::<()>();

@@ -60,15 +60,8 @@ pub(crate) fn generate<'py>(
     let stop = AtomicBool::new(false);
     let check = if verify { Check::Hashes } else { Check::Sizes };
     let task = Task { index, total: count };
-    let run = Run {
-        frames: 0..frames,
-        task,
-        workers: threads,
-        threads: Threads::One,
-        check,
-        stop: &stop,
-        profile: None,
-    };
+    let run =
+        Run { frames: 0..frames, task, workers: threads, threads: Threads::One, check, stop: &stop, profile: None };
     let engine = &made_by.engine;
     let mut interrupted: Option<PyErr> = None;
     let progress = progress.map(Bound::unbind);
