@@ -18,12 +18,7 @@ pub enum Error {
     },
     /// A window exceeds the image or is too small.
     #[error(
-        "window {},{},{},{} (left, top, width, height): expected a part inside the image of {width} x {height} px, at \
-         least {min_side} px wide and high",
-        window.left,
-        window.top,
-        window.width,
-        window.height
+        "the window must be inside the image of {width} x {height} pixels and at least {min_side} pixels wide and high"
     )]
     Window {
         /// The window.
