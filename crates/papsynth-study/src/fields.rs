@@ -156,10 +156,10 @@ fn name(path: &Path) -> String {
 pub(crate) fn bytes(path: &Path, limit: u64) -> Result<Vec<u8>, Error> {
     let failed = Error::io("read", path);
     let mut bytes = Vec::new();
-    let read = File::open(path).and_then(|file| match file.metadata()?.is_file() {
-        // Reading a pipe could block forever.
+    // Opening a pipe could block forever.
+    let read = path.metadata().and_then(|metadata| match metadata.is_file() {
         false => Err(io::Error::other("not a regular file")),
-        true => file.take(limit.saturating_add(1)).read_to_end(&mut bytes),
+        true => File::open(path)?.take(limit.saturating_add(1)).read_to_end(&mut bytes),
     });
     let read = read.map_err(failed)? as u64;
     if read > limit {

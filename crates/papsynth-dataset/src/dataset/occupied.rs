@@ -43,8 +43,10 @@ fn is_output(folder: &Path) -> bool {
     [[names::MANIFEST, FORMAT], SLIDE].iter().any(|[name, format]| {
         // The format is at the beginning of a file that may be long.
         let mut begin = Vec::new();
-        let read = File::open(folder.join(name)).and_then(|file| file.take(64).read_to_end(&mut begin));
-        read.is_ok() && String::from_utf8_lossy(&begin).contains(&format!("\"{format}\""))
+        let path = folder.join(name);
+        // Opening a pipe could block forever.
+        let read = path.is_file() && File::open(&path).and_then(|f| f.take(64).read_to_end(&mut begin)).is_ok();
+        read && String::from_utf8_lossy(&begin).contains(&format!("\"{format}\""))
     })
 }
 
