@@ -65,7 +65,7 @@ impl Viewer {
             }
             ["label", image, group, level, name] => {
                 let Some(known) = Group::ALL.into_iter().find(|known| known.name() == group) else {
-                    let group = group.escape_default();
+                    let group = excerpt(group);
                     let message = format!("unknown label group `{group}`; expected cytoplasm, nucleus or debris");
                     return Err(Reply::error(404, &message));
                 };
@@ -140,17 +140,24 @@ fn slide(path: &Path) -> Result<(&'static str, Box<dyn Source>), Error> {
     Err(folder(path, format!("a slide needs {}", built_with("zarr"))))
 }
 
+/// Returns the first characters of a word of a request, escaped.
+fn excerpt(word: &str) -> String {
+    /// Maximum number of characters.
+    const CHARS: usize = 30;
+    word.chars().take(CHARS).flat_map(char::escape_default).collect()
+}
+
 /// Parses a number of 1 to 9 digits.
 fn number(word: &str) -> Result<usize, Reply> {
     let is_number = (1..=9).contains(&word.len()) && word.bytes().all(|byte| byte.is_ascii_digit());
     let number = if is_number { word.parse().ok() } else { None };
-    number.ok_or_else(|| Reply::error(400, &format!("`{}`: expected a number of 1 to 9 digits", word.escape_default())))
+    number.ok_or_else(|| Reply::error(400, &format!("`{}`: expected a number of 1 to 9 digits", excerpt(word))))
 }
 
 /// Parses a level and `ROW-COLUMN.png`.
 fn place(level: &str, name: &str) -> Result<TileIndex, Reply> {
     let Some((row, column)) = name.strip_suffix(".png").and_then(|name| name.split_once('-')) else {
-        return Err(Reply::error(400, &format!("`{}`: expected ROW-COLUMN.png", name.escape_default())));
+        return Err(Reply::error(400, &format!("`{}`: expected ROW-COLUMN.png", excerpt(name))));
     };
     Ok(TileIndex { level: number(level)?, row: number(row)?, column: number(column)? })
 }

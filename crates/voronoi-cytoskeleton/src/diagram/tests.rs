@@ -134,8 +134,8 @@ fn border_vertices_are_on_the_border() {
 fn invalid_sites_are_reported() {
     let window = Window::rectangle([0.0, 0.0], [10.0, 10.0]).unwrap();
     let message = |sites: &[Point]| Diagram::new(sites, &window).unwrap_err().to_string();
-    assert!(message(&[]).starts_with("0 sites"));
-    assert!(message(&[[1.0, 1.0], [2.0, 2.0], [1.0, 1.0]]).starts_with("3 sites at 2"));
+    assert!(message(&[]).starts_with("sites: 0"));
+    assert!(message(&[[1.0, 1.0], [2.0, 2.0], [1.0, 1.0]]).starts_with("sites: 3, different positions: 2"));
     assert!(message(&[[1.0, 1.0], [f64::NAN, 2.0]]).starts_with("site 1 = [NaN, 2]"));
     assert!(message(&[[1.0, 1.0], [2.0, f64::NEG_INFINITY]]).starts_with("site 1 ="));
     assert!(message(&[[1.0, 1.0], [11.0, 2.0]]).starts_with("site 1 at [11, 2] is outside"));
