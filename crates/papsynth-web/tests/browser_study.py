@@ -186,7 +186,7 @@ def yes_no(program, browser, real, synthetic, folder):
     browser.collect()
     browser.run("document.getElementById('more').open = true")
     browser.picture(folder / "result.png")
-    subject = folder / "out/ann"
+    subject = folder / "out/01"
     # The patch may have been sent before the reload.
     at = showings.index(None)
     showings[at : at + 2] = [int(rows_of(subject)[at]["showings"])]

@@ -52,7 +52,7 @@ const SMALLER: &[Smaller] = &[
     Smaller { command: "study --results", replaced: &[], inserted: &[] },
     Smaller {
         command: "study",
-        replaced: &[("--subject", "ann")],
+        replaced: &[("--subject", "01")],
         inserted: &["--trials 4 --training 1 --patch-px 64"],
     },
     Smaller { command: "slide tile", replaced: &[("--size", "64,48")], inserted: &[SLIDE] },
@@ -160,7 +160,7 @@ fn images(bench: &Bench, name: &str, seed: u32) {
 /// Answers the study that was begun in the folder `results` to its end.
 fn answer_all(bench: &Bench) {
     let params =
-        StudyParams { subject: "ann".to_owned(), trials: 4, training: 1, patch_px: 64, ..StudyParams::default() };
+        StudyParams { subject: "01".to_owned(), trials: 4, training: 1, patch_px: 64, ..StudyParams::default() };
     let folder = |name: &str| bench.path(name);
     let mut session = Session::open(&params, &folder("real"), &folder("fields"), &folder("results")).unwrap();
     while let Some(name) = session.state().patches.first().cloned() {

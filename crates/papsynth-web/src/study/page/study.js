@@ -274,8 +274,8 @@ async function result() {
     cell(row, minus(criterion, 2));
   }
   rows.rows[1].className = "random";
-  const { hits, of } = summary.row.accuracy;
-  element("verdict").textContent = `${hits} of ${of} answers were correct; guessing gives about ${Math.round(of / 2)}.`;
+  const { hits, total } = summary.row.accuracy;
+  element("verdict").textContent = `${hits} of ${total} answers were correct; guessing gives about ${Math.round(total / 2)}.`;
   const { half_width, trials } = summary.precision;
   element("claim").textContent =
     `An accuracy of ±${Math.round(100 * half_width)} percentage points needs ${trials} trials, from one subject or several pooled.`;
