@@ -16,7 +16,7 @@ use super::values::{integer, named, parse_pixel};
 #[command(after_help = "\
 Examples:
   papsynth study real fields --out results --subject 01          120 patches, about 10 minutes
-  papsynth study real fields --out results --subject ben --open
+  papsynth study real fields --out results --subject 02 --open
   papsynth study real fields --out pairs --design 2afc           two patches at a time
   papsynth study real fields --out try --trials 10 --exposure-ms 500
   papsynth study real fields --pixel-um 0.33                     resample to equal pixel sizes
