@@ -45,9 +45,9 @@ class Viewer(Browser):
         return self.run(f"""(async () => {{
             const side = image.tile;
             const response = await fetch(`{layer}/0/${{Math.floor({y} / side)}}-${{Math.floor({x} / side)}}.png`);
-            const image = await createImageBitmap(await response.blob());
-            const own = new OffscreenCanvas(image.width, image.height).getContext("2d");
-            own.drawImage(image, 0, 0);
+            const tile = await createImageBitmap(await response.blob());
+            const own = new OffscreenCanvas(tile.width, tile.height).getContext("2d");
+            own.drawImage(tile, 0, 0);
             return [...own.getImageData({x} % side, {y} % side, 1, 1).data];
         }})()""")
 
