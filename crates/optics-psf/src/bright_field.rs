@@ -1,10 +1,10 @@
-use crate::canvas::{Canvas, Samples, Spectra, absorbed, absorbed_of, amplitude_of, is_nonzero};
+use crate::canvas::{Canvas, CanvasScratch, ImageStripe, Samples, Spectra, absorbed, is_nonzero, transmit};
 use crate::error::{Error, require, within};
-use crate::filter::{Filter, Lattice};
+use crate::filter::Filter;
 use crate::grid::{SIDES, fast_length};
-use crate::lane_plane::{LanePlans, LaneScratch, Lanes};
-use crate::light::{add_stray_light, mean_of_pixels};
+use crate::light::{add_stray_light, times};
 use crate::microscope::distance;
+use crate::spectrum::LanePlans;
 use crate::{Microscope, Transfer};
 
 /// Parameters of [`BrightField`]: the grid, the depths of the object's slabs, and the stage positions.
@@ -54,10 +54,9 @@ pub enum Padding {
 /// contrast for one slab and 2 % for two overlapping slabs.
 ///
 /// `BrightField` computes its filters once. A [`Specimen`] holds the object; each image then costs one inverse FFT per
-/// non-empty slab. Slabs with at least 2 µm of defocus are computed at camera pixels, if little detail finer than
-/// pixels remains. This loses products of sub-pixel detail of two slabs, below 0.1 % of the contrast, and nothing at an
-/// oversampling of 1. The paper's Gaussians (Eqs. 11 to 14, [`Gaussian`](crate::Gaussian)) have errors of 8 to 87 %
-/// where this model has 1 %.
+/// non-empty slab. Factors are means over pixels before they are multiplied, which loses products of details of two
+/// slabs that are finer than pixels: below 0.1 % of the contrast, and nothing at an oversampling of 1. The paper's
+/// Gaussians (Eqs. 11 to 14, [`Gaussian`](crate::Gaussian)) have errors of 8 to 87 % where this model has 1 %.
 #[derive(Debug)]
 pub struct BrightField {
     microscope: Microscope,
@@ -68,19 +67,28 @@ pub struct BrightField {
     planes: Vec<Vec<Filter>>,
 }
 
-/// The object: spectra of absorption and phase delay of each slab. [`BrightField::specimen`] creates it for one
-/// `BrightField`. It also holds working memory: after the first image, nothing is allocated.
+/// The object: absorption and phase delay of each slab. [`BrightField::specimen`] creates it for one `BrightField`. It
+/// also holds working memory: after the first image, nothing is allocated.
 #[derive(Debug, Clone, Default)]
 pub struct Specimen {
-    slabs: Vec<Spectra>,
-    scratch: LaneScratch,
-    product: Vec<f32>,
+    slabs: Vec<Slab>,
+    scratch: CanvasScratch,
+    factor: Vec<f32>,
+    phases: Vec<f32>,
+}
+
+/// Samples of a slab; empty vectors stand for zero. Its spectra are computed on demand.
+#[derive(Debug, Clone, Default)]
+struct Slab {
+    absorbed: Vec<f32>,
+    phase: Vec<f32>,
+    spectra: Option<Spectra>,
 }
 
 impl Specimen {
     /// Clears all slabs.
     pub fn clear(&mut self) {
-        self.slabs.iter_mut().for_each(Spectra::clear);
+        self.slabs.iter_mut().for_each(|slab| *slab = Slab::default());
     }
 }
 
@@ -98,11 +106,11 @@ impl BrightField {
             require(field, value as f64, holds, "a multiple of the oversampling from 1 to 32768").map(|_| value)
         };
         let size = [side("width", params.width)?, side("height", params.height)?];
-        let grid = match params.padding {
-            Padding::Periodic => size,
+        let grid_px = match params.padding {
+            Padding::Periodic => size.map(|side| side / oversampling),
             Padding::Clear { px } => {
                 within("padding.px", px as f64, 0.0..=16_384.0, "a whole number from 0 to 16384")?;
-                size.map(|side| oversampling * fast_length((side + px).div_ceil(oversampling)))
+                size.map(|side| fast_length((side + px).div_ceil(oversampling)))
             }
         };
         for (field, list) in [("depths_um", &params.depths_um), ("stages_um", &params.stages_um)] {
@@ -115,7 +123,7 @@ impl BrightField {
         Ok(Self {
             microscope: microscope.clone(),
             size,
-            canvas: Canvas::new(microscope, grid, &LanePlans::default()),
+            canvas: Canvas::new(microscope, grid_px, oversampling, &LanePlans::default()),
             in_focus: Filter::in_focus(microscope),
             planes: params.stages_um.iter().map(plane).collect(),
         })
@@ -125,7 +133,7 @@ impl BrightField {
     #[must_use]
     pub fn specimen(&self) -> Specimen {
         let slabs = self.planes.first().map_or(0, Vec::len);
-        Specimen { slabs: vec![Spectra::default(); slabs], ..Specimen::default() }
+        Specimen { slabs: vec![Slab::default(); slabs], ..Specimen::default() }
     }
 
     /// Returns the width and height of an image in camera pixels.
@@ -140,7 +148,10 @@ impl BrightField {
     ///
     /// If the slab does not exist, or the number of samples differs from that of the object.
     pub fn set_absorbance(&self, specimen: &mut Specimen, slab: usize, absorbance: &[f32]) {
-        self.set_absorbed(specimen, slab, absorbance, 0.0, absorbed);
+        self.check(absorbance);
+        let slab = &mut specimen.slabs[slab];
+        absorbed(absorbance, &mut slab.absorbed);
+        slab.changed();
     }
 
     /// Sets the transmittance, 0 to 1, of a slab. Its phase delay is kept.
@@ -149,7 +160,11 @@ impl BrightField {
     ///
     /// See [`BrightField::set_absorbance`].
     pub fn set_transmittance(&self, specimen: &mut Specimen, slab: usize, transmittance: &[f32]) {
-        self.set_absorbed(specimen, slab, transmittance, 1.0, absorbed_of);
+        self.check(transmittance);
+        let slab = &mut specimen.slabs[slab];
+        slab.absorbed.clear();
+        slab.absorbed.extend(transmittance.iter().map(|t| 1.0 - t));
+        slab.changed();
     }
 
     /// Sets the phase delay of a slab, in radians. Its absorption is kept.
@@ -158,39 +173,16 @@ impl BrightField {
     ///
     /// See [`BrightField::set_absorbance`].
     pub fn set_phase(&self, specimen: &mut Specimen, slab: usize, phase_rad: &[f32]) {
-        let Specimen { slabs, scratch, .. } = specimen;
-        self.transform(phase_rad, 0.0, &mut slabs[slab].phase, scratch, is_nonzero);
+        self.check(phase_rad);
+        let slab = &mut specimen.slabs[slab];
+        slab.phase.clear();
+        slab.phase.extend_from_slice(phase_rad);
+        slab.changed();
     }
 
-    fn set_absorbed(
-        &self,
-        specimen: &mut Specimen,
-        slab: usize,
-        samples: &[f32],
-        background: f32,
-        map: impl Fn(&mut [f32]) -> bool,
-    ) {
-        let Specimen { slabs, scratch, .. } = specimen;
-        let spectra = &mut slabs[slab];
-        spectra.clear_absorbed();
-        self.transform(samples, background, &mut spectra.absorbed, scratch, &map);
-        if self.planes.iter().any(|plane| plane[slab].is_corrected) {
-            self.transform(samples, background, &mut spectra.amplitude, scratch, amplitude_of(map));
-        }
-    }
-
-    /// Computes the spectrum of `map(samples)`, or an empty one if all samples equal the background.
-    fn transform(
-        &self,
-        samples: &[f32],
-        background: f32,
-        spectrum: &mut Vec<Lanes>,
-        scratch: &mut LaneScratch,
-        map: impl Fn(&mut [f32]) -> bool,
-    ) {
+    fn check(&self, samples: &[f32]) {
         let [width, height] = self.size;
         assert_eq!(samples.len(), width * height, "a slab must have as many samples as the object");
-        self.canvas.transform(Samples { samples, width, offset: 0, background }, map, spectrum, scratch);
     }
 
     /// Returns the image at a stage position: the intensity at each camera pixel relative to an empty slide, including
@@ -216,50 +208,49 @@ impl BrightField {
     pub fn image_into(&self, specimen: &mut Specimen, plane: usize, out: &mut [f32]) -> usize {
         let [image_width, image_height] = self.image_size();
         assert_eq!(out.len(), image_width * image_height, "`out` must have as many pixels as the image");
-        let Specimen { slabs, scratch, product } = specimen;
+        let Specimen { slabs, scratch, factor, phases } = specimen;
         let filters = &self.planes[plane];
         assert_eq!(slabs.len(), filters.len(), "the specimen belongs to another BrightField");
-        for (slab, filter) in slabs.iter_mut().zip(filters) {
-            if filter.is_corrected {
-                self.canvas.correct(&self.in_focus, slab, scratch);
-            }
-        }
-        let oversampling = self.microscope.params().oversampling;
-        let [width, height] = self.size;
         let mut clipped = 0;
         out.fill(1.0);
-        let on_object = |(slab, filter): (&Spectra, &Filter)| filter.lattice == Lattice::Object && !slab.is_empty();
-        if slabs.iter().zip(filters).any(on_object) {
-            product.clear();
-            product.resize(width * height, 1.0);
-            let samples = self.expose(Lattice::Object, slabs, filters, product, width, scratch);
-            clipped = samples.div_ceil(oversampling * oversampling);
-            mean_of_pixels(product, width, oversampling, out);
+        for (slab, filter) in slabs.iter_mut().zip(filters) {
+            if slab.absorbed.is_empty() && slab.phase.is_empty() {
+                continue;
+            }
+            // Spectra of a phase delay need samples of absorbed light, too.
+            slab.absorbed.resize(self.size[0] * self.size[1], 0.0);
+            let Slab { absorbed, phase, spectra } = slab;
+            let samples = Samples { absorbed, behind: &[], phase, width: self.size[0], offset: 0 };
+            let spectra = spectra.get_or_insert_with(|| {
+                let mut spectra = Spectra::default();
+                self.canvas.load(samples, &mut spectra, scratch);
+                spectra
+            });
+            if filter.is_corrected {
+                self.canvas.correct(&self.in_focus, samples, spectra, scratch);
+            }
+            for image in [&mut *factor, phases] {
+                image.clear();
+                image.resize(out.len(), 0.0);
+            }
+            let add = |stripe: ImageStripe<'_>| stripe.add_to(factor, phases, image_width, 0, image_width);
+            self.canvas.expose(filter, spectra, image_width, add, scratch);
+            clipped += transmit(factor, if phase.is_empty() { &[] } else { phases });
+            times(out, factor);
         }
-        clipped += self.expose(Lattice::Camera, slabs, filters, out, image_width, scratch);
         add_stray_light(out, self.microscope.params().stray_light);
         clipped
     }
+}
 
-    /// Multiplies `product` by the transmittance of the slabs computed on `lattice`. Returns the number of clipped
-    /// values.
-    fn expose(
-        &self,
-        lattice: Lattice,
-        slabs: &[Spectra],
-        filters: &[Filter],
-        product: &mut [f32],
-        width: usize,
-        scratch: &mut LaneScratch,
-    ) -> usize {
-        let here = || filters.iter().zip(slabs).filter(|(filter, _)| filter.lattice == lattice);
-        let absorbing = here().filter(|(_, slab)| !slab.absorbed.is_empty());
-        let transmit = |(filter, slab)| self.canvas.transmit::<false>(filter, slab, product, width, scratch);
-        let clipped = absorbing.map(transmit).sum();
-        let refracting = here().filter(|(_, slab)| !slab.phase.is_empty());
-        if refracting.clone().next().is_some() {
-            self.canvas.refract(lattice, refracting, product, width, scratch);
+impl Slab {
+    /// Prepares for new samples.
+    fn changed(&mut self) {
+        self.spectra = None;
+        for samples in [&mut self.absorbed, &mut self.phase] {
+            if !is_nonzero(samples) {
+                samples.clear();
+            }
         }
-        clipped
     }
 }

@@ -2,35 +2,31 @@ use multiversion::multiversion;
 use portable_numerics::elementary::exp_f32;
 
 use crate::Microscope;
-use crate::filter::{Block, Filter, Lattice, Part};
-use crate::lane_plane::{LANES, LanePlane, LanePlans, LaneScratch, LaneSupport, Lanes, STRIPE, ZERO};
+use crate::filter::{Block, BlockSpectrum, Filter};
 use crate::pupil::turn;
+use crate::spectrum::{Grid, GridScratch, LANES, LanePlans, Lanes, Pixels, Spectrum, Support, ZERO};
 use crate::transfer::Transfer;
 
 /// Smallest transmittance of a factor. W ⊗ 10^(−A) undershoots to about −0.05 next to objects of A > 1; light cannot be
 /// negative.
 pub const MIN_TRANSMITTANCE: f32 = 1e-3;
 
-/// A periodic rectangle of the slide with its object and camera lattices.
+/// A periodic rectangle of the slide: the lattice of an object, one or several samples per pixel, and that of the
+/// camera.
 #[derive(Debug)]
 pub(crate) struct Canvas {
-    object: Raster,
-    camera: Raster,
+    object: Grid,
     /// Grid on which blurred amplitudes are squared.
-    squares: LanePlane,
+    squares: Grid,
+    camera: Grid,
+    support: Support,
     /// Frequency step along x, in steps of the filters' tables.
     step_x: f32,
     /// Frequencies along y in these steps, per block.
     y: Vec<[f32; LANES]>,
-    /// Transfer of the pixel mean along x and y.
+    /// Transfer of the mean over the samples of a pixel along x and y.
     pixel: [PixelMean; 2],
-}
-
-/// A lattice and the frequencies that the microscope transfers.
-#[derive(Debug)]
-struct Raster {
-    plane: LanePlane,
-    support: LaneSupport,
+    is_pixel_mean: bool,
 }
 
 /// Transfer of the pixel mean at frequencies 0, 1, … of one axis.
@@ -43,53 +39,93 @@ struct PixelMean {
 }
 
 impl PixelMean {
-    /// Computes complete blocks of frequencies. The mean is (1/n) ∑ₖ exp 2πi f k over the samples of a pixel, with f in
-    /// cycles per sample: relative to its centre, and relative to its first sample, k = 0 … n − 1.
+    /// Computes complete blocks of frequencies. The mean is over `n` points per pixel and axis, of an image with
+    /// `samples` per pixel and axis.
+    ///
+    /// If there are fewer samples than points, each sample is already the mean of its points, interpolated by
+    /// Catmull–Rom cubics. That mean contains the images of the interpolation, which no lens transfers: the ratio of
+    /// the responses without and with images removes them.
     #[expect(clippy::cast_possible_truncation, reason = "spectra use single precision")]
-    fn new(side: usize, n: usize) -> Self {
+    fn new(side: usize, samples: usize, n: usize) -> Self {
+        // Positions of the points relative to the centre of the first sample.
+        let point = |k: usize| (k as f64 + 0.5) * samples as f64 / n as f64 - 0.5;
+        let centre = 0.5 * (samples - 1) as f64;
         let mean = |place: usize| {
             let f = place as f64 / side as f64;
-            let (mut centred, mut moved) = (0.0, [0.0; 2]);
+            let (mut centred, mut moved, mut cubic) = (0.0, [0.0; 2], [0.0; 2]);
             for k in 0..n {
-                let (c, s) = turn(f * k as f64);
+                let (c, s) = turn(f * point(k));
                 moved = [moved[0] + c / n as f64, moved[1] + s / n as f64];
-                centred += turn(f * (k as f64 - 0.5 * (n - 1) as f64)).0 / n as f64;
+                centred += turn(f * (point(k) - centre)).0 / n as f64;
+                let [without, with] = cubic_responses(f, point(k));
+                cubic = [cubic[0] + without, cubic[1] + with];
             }
-            (centred as f32, moved.map(|v| v as f32))
+            let ratio = if samples < n { cubic[0] / cubic[1] } else { 1.0 };
+            ((ratio * centred) as f32, moved.map(|v| (ratio * v) as f32))
         };
         let (size, moved) = (0..(side / 2 + 1).next_multiple_of(LANES)).map(mean).unzip();
         Self { size, moved }
     }
 }
 
-/// Spectra of an object at one depth; empty vectors stand for zero.
+/// Returns the response of Catmull–Rom interpolation to a frequency in cycles per sample, at a position in samples: the
+/// wave itself, and together with its images at higher frequencies, relative to the wave at the position 0.
+fn cubic_responses(f: f64, position: f64) -> [f64; 2] {
+    let first = position.floor();
+    let t = position - first;
+    let weights = [
+        ((-0.5 * t + 1.0) * t - 0.5) * t,
+        (1.5 * t - 2.5) * t * t + 1.0,
+        ((-1.5 * t + 2.0) * t + 0.5) * t,
+        (0.5 * t - 0.5) * t * t,
+    ];
+    let mut responses = [0.0; 2];
+    for (weight, neighbour) in weights.into_iter().zip([first - 1.0, first, first + 1.0, first + 2.0]) {
+        responses[0] += weight * turn(f * (neighbour - position)).0;
+        responses[1] += weight * turn(f * neighbour).0;
+    }
+    responses
+}
+
+/// Spectra of an object at one depth.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Spectra {
-    /// Spectrum of 1 − 10^(−A).
-    pub(crate) absorbed: Vec<Lanes>,
-    /// Spectrum of a = 1 − 10^(−A/2) if the correction needs it; later of 1 − 10^(−A) − 2a.
-    pub(crate) amplitude: Vec<Lanes>,
-    /// Spectrum of (1 − W₀ ⊗ a)² − W₀ ⊗ 10^(−A), computed on demand.
-    pub(crate) correction: Vec<Lanes>,
-    /// Spectrum of φ.
-    pub(crate) phase: Vec<Lanes>,
+    /// Spectrum of absorbed light 1 − T, plus i times the phase delay if there is one.
+    light: Spectrum,
+    /// Spectrum of (W₀ ⊗ a)² − W₀ ⊗ a² for a = 1 − √T, computed on demand.
+    correction: Spectrum,
 }
 
 impl Spectra {
-    pub(crate) fn is_empty(&self) -> bool {
-        self.absorbed.is_empty() && self.phase.is_empty()
-    }
-
-    pub(crate) fn clear_absorbed(&mut self) {
-        for spectrum in [&mut self.absorbed, &mut self.amplitude, &mut self.correction] {
-            spectrum.clear();
-        }
-    }
-
     pub(crate) fn clear(&mut self) {
-        self.clear_absorbed();
-        self.phase.clear();
+        self.light.clear();
+        self.correction.clear();
     }
+}
+
+/// Samples of an object, in rows of `width`, with a margin of `offset` samples of empty slide at the left and at the
+/// top.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Samples<'a> {
+    /// Light absorbed by the object: transmittance without it minus transmittance with it.
+    pub(crate) absorbed: &'a [f32],
+    /// Transmittance without the object; empty if it is 1.
+    pub(crate) behind: &'a [f32],
+    /// Phase delay in radians; empty if there is none.
+    pub(crate) phase: &'a [f32],
+    pub(crate) width: usize,
+    pub(crate) offset: usize,
+}
+
+/// Working memory of [`Canvas`].
+#[derive(Debug, Clone, Default)]
+pub(crate) struct CanvasScratch {
+    grid: GridScratch,
+    /// Amplitude a, and a².
+    amplitude: Vec<f32>,
+    square: Vec<f32>,
+    spectra: [Spectrum; 2],
+    block: Vec<Lanes>,
 }
 
 /// Samples per period of the finest transferred detail on the grid for squares. Three would avoid all aliases. With
@@ -97,204 +133,289 @@ impl Spectra {
 const SQUARED_CUTOFFS: f64 = 2.4;
 
 impl Canvas {
-    /// Creates the lattices. `size` is in object samples, a multiple of the oversampling.
-    pub(crate) fn new(microscope: &Microscope, size: [usize; 2], plans: &LanePlans) -> Self {
-        let oversampling = microscope.params().oversampling;
-        let pitch = microscope.pitch_um();
-        let raster = |stride: usize| {
-            let [width, height] = size.map(|side| side / stride);
-            let support = LaneSupport::new(width, height, microscope.cutoff() * pitch * stride as f64);
-            Raster { plane: LanePlane::new(width, height, plans), support }
-        };
+    /// Creates the lattices of a rectangle of `size_px`, with `samples` per pixel and axis.
+    pub(crate) fn new(microscope: &Microscope, size_px: [usize; 2], samples: usize, plans: &LanePlans) -> Self {
+        let pitch = microscope.params().pixel_um / samples as f64;
+        let size = size_px.map(|side| side * samples);
+        let support = Support::new(size, microscope.cutoff() * pitch);
         // Three samples per four of the object's, if this is fine enough and the size is divisible.
         let is_fine = 0.75 >= SQUARED_CUTOFFS * microscope.cutoff() * pitch;
-        let [width, height] = size.map(|side| if is_fine && side.is_multiple_of(4) { side / 4 * 3 } else { side });
+        let squares = size.map(|side| if is_fine && side.is_multiple_of(4) { side / 4 * 3 } else { side });
         let steps = size.map(|side| 1.0 / (side as f64 * pitch * Transfer::step_of(microscope)));
-        let object = raster(1);
         #[expect(clippy::cast_possible_truncation, reason = "tables use single precision")]
         let y = |block: usize| core::array::from_fn(|lane| (block * LANES + lane) as f32 * steps[1] as f32);
         Self {
-            y: (0..object.support.blocks()).map(y).collect(),
-            camera: raster(oversampling),
-            squares: LanePlane::new(width, height, plans),
-            object,
+            y: (0..support.blocks()).map(y).collect(),
+            object: Grid::new(size, plans),
+            squares: Grid::new(squares, plans),
+            camera: Grid::new(size_px, plans),
+            support,
             #[expect(clippy::cast_possible_truncation, reason = "tables use single precision")]
             step_x: steps[0] as f32,
-            pixel: size.map(|side| PixelMean::new(side, oversampling)),
+            pixel: size.map(|side| PixelMean::new(side, samples, microscope.params().oversampling)),
+            is_pixel_mean: microscope.params().oversampling > 1,
         }
     }
 
-    /// Computes the spectrum of an image on the object's lattice, or an empty one if the image is empty. `map` is
-    /// applied to rows of `width` samples, placed at `offset` from the left and upper edge in `background`. `map` must
-    /// return 0 for the background, and reports whether any value is not 0.
-    pub(crate) fn transform(
-        &self,
-        image: Samples<'_>,
-        map: impl Fn(&mut [f32]) -> bool,
-        spectrum: &mut Vec<Lanes>,
-        scratch: &mut LaneScratch,
-    ) {
-        let Samples { samples, width, offset, background } = image;
-        let Raster { plane, support } = &self.object;
-        let rows = offset..offset + samples.len() / width;
+    /// Computes the spectrum of the light.
+    pub(crate) fn load(&self, samples: Samples<'_>, spectra: &mut Spectra, scratch: &mut CanvasScratch) {
+        let Samples { absorbed, phase, width, offset, .. } = samples;
+        spectra.clear();
+        if phase.is_empty() {
+            self.transform(absorbed, width, offset, &mut spectra.light, &mut scratch.grid);
+            return;
+        }
         let fill = |left: usize, stripe: &mut [Lanes]| {
-            let (first, end) = (left.max(offset), (left + STRIPE).min(offset + width));
-            if first >= end {
-                return false;
-            }
-            stripe[..rows.start].fill(ZERO);
-            stripe[rows.end..].fill(ZERO);
-            let inside = &mut stripe[rows.clone()];
-            for (stripe, row) in inside.iter_mut().zip(samples.chunks_exact(width)) {
-                let (line, row) = (stripe.as_flattened_mut(), &row[first - offset..end - offset]);
-                // Full stripes have a length known at compile time.
-                match (line.first_chunk_mut::<STRIPE>(), row.first_chunk::<STRIPE>()) {
-                    (Some(line), Some(row)) => *line = *row,
-                    _ => {
-                        line.fill(background);
-                        line[first - left..end - left].copy_from_slice(row);
-                    }
-                }
-            }
-            map(inside.as_flattened_mut().as_flattened_mut())
+            fill(absorbed, width, offset, left, stripe, 0) && fill(phase, width, offset, left, stripe, 1)
         };
-        plane.forward(support, fill, spectrum, scratch);
+        self.object.forward(&self.support, Pixels::Complex, fill, &mut spectra.light, &mut scratch.grid);
     }
 
-    /// Adds a block of a spectrum times a response of a filter to `sum`.
-    fn add(&self, (filter, part): (&Filter, Part), spectrum: &[Lanes], block: usize, reach: usize, sum: &mut [Lanes]) {
+    /// Computes the spectrum of a real image.
+    fn transform(
+        &self,
+        image: &[f32],
+        width: usize,
+        offset: usize,
+        spectrum: &mut Spectrum,
+        scratch: &mut GridScratch,
+    ) {
+        let fill = |left: usize, stripe: &mut [Lanes]| {
+            let parts = [0, 1].map(|part| fill(image, width, offset, left + part * LANES, stripe, part));
+            parts[0] || parts[1]
+        };
+        self.object.forward(&self.support, Pixels::Real, fill, spectrum, scratch);
+    }
+
+    /// Computes the in-focus correction if it is missing.
+    ///
+    /// In focus, the factor is the squared blurred amplitude (1 − W₀ ⊗ a)². It differs from the blurred transmittance
+    /// W₀ ⊗ T = 1 − W₀ ⊗ (2a − a²) by (W₀ ⊗ a)² − W₀ ⊗ a². An object in front of others absorbs the amplitude a = √T₀
+    /// − √T; the other terms are linear if T₀ varies slowly.
+    pub(crate) fn correct(
+        &self,
+        in_focus: &Filter,
+        samples: Samples<'_>,
+        spectra: &mut Spectra,
+        scratch: &mut CanvasScratch,
+    ) {
+        if !spectra.correction.is_empty() || spectra.light.is_empty() {
+            return;
+        }
+        let Samples { absorbed, behind, width, offset, .. } = samples;
+        let CanvasScratch { grid, amplitude, square, spectra: [of_amplitude, of_square], block: blurred } = scratch;
+        amplitude.resize(absorbed.len(), 0.0);
+        square.resize(if behind.is_empty() { 0 } else { absorbed.len() }, 0.0);
+        amplitudes(absorbed, behind, amplitude, square);
+        self.transform(amplitude, width, offset, of_amplitude, grid);
+        if behind.is_empty() {
+            // a² = 2a − (1 − T).
+            of_square.plus.clone_from(&of_amplitude.plus);
+            squares_of(&mut of_square.plus, &spectra.light);
+        } else {
+            self.transform(square, width, offset, of_square, grid);
+        }
+        // Scales of the image, and of its spectrum at the object's number of samples.
+        let (norm, scale) = (self.object.norm(), self.squares.norm() / self.object.norm());
+        let blur = |block: usize, plus: &mut [Lanes], _: &mut [Lanes]| {
+            self.image(in_focus, of_amplitude, None, block, plus, &mut []);
+        };
+        self.squares.squared(&self.support, blur, [norm, scale], &mut spectra.correction, grid);
+        for block in 0..self.support.blocks() {
+            let range = self.support.range(block);
+            blurred.resize(range.len(), ZERO);
+            self.image(in_focus, of_square, None, block, blurred, &mut []);
+            subtract(&mut spectra.correction.plus[range], blurred);
+        }
+    }
+
+    /// Filters a block of a spectrum.
+    fn image(
+        &self,
+        filter: &Filter,
+        light: &Spectrum,
+        correction: Option<&Spectrum>,
+        block: usize,
+        plus: &mut [Lanes],
+        minus: &mut [Lanes],
+    ) {
+        let range = self.support.range(block);
         let at = Block {
             step_x: self.step_x,
             y: &self.y[block],
             pixel_x: &self.pixel[0].size,
             pixel_y: &self.pixel[1].size.as_chunks().0[block],
         };
-        filter.add(part, at, self.object.support.block(spectrum, block), reach, sum);
+        let from = BlockSpectrum {
+            plus: &light.plus[range.clone()],
+            minus: if light.minus.is_empty() { &[] } else { &light.minus[range.clone()] },
+            correction: correction.map(|correction| &correction.plus[range]),
+        };
+        filter.image(at, &from, plus, minus);
     }
 
-    /// Computes the in-focus correction if it is missing. With 1 − T = 2a − a² it is (1 − W₀ ⊗ a)² − W₀ ⊗ T = (W₀ ⊗ a)²
-    /// + W₀ ⊗ (1 − T − 2a).
-    pub(crate) fn correct(&self, in_focus: &Filter, spectra: &mut Spectra, scratch: &mut LaneScratch) {
-        let Spectra { absorbed, amplitude, correction, .. } = spectra;
-        if !correction.is_empty() || amplitude.is_empty() {
-            return;
-        }
-        let Raster { plane, support } = &self.object;
-        // Scales of the image, and of its spectrum at the object's number of samples.
-        let (norm, scale) = (plane.norm(), self.squares.norm() / plane.norm());
-        let blurred = (in_focus, Part::Absorption);
-        let fill = |block: usize, line: &mut [Lanes]| {
-            self.add(blurred, amplitude, block, support.reach(block), line);
-        };
-        let square = |stripe: &mut [Lanes]| squared(stripe.as_flattened_mut().as_flattened_mut(), norm, scale);
-        self.squares.mapped(support, fill, square, correction, scratch);
-        twice_less(amplitude.as_flattened_mut().as_flattened_mut(), absorbed.as_flattened().as_flattened());
-        for block in 0..support.blocks() {
-            self.add(blurred, amplitude, block, support.reach(block), support.block_mut(correction, block));
-        }
-    }
-
-    fn invert(
-        &self,
-        lattice: Lattice,
-        mut add: impl FnMut(usize, usize, &mut [Lanes]),
-        columns: usize,
-        visit: impl FnMut(usize, &[Lanes]),
-        scratch: &mut LaneScratch,
-    ) {
-        let Raster { plane, support } = match lattice {
-            Lattice::Object => &self.object,
-            Lattice::Camera => &self.camera,
-        };
-        let fill = |block: usize, line: &mut [Lanes]| {
-            let reach = support.reach(block);
-            add(block, reach, line);
-            if lattice == Lattice::Camera {
-                let [x, y] = &self.pixel;
-                mean_over_pixels(line, &x.moved[..=reach], &y.moved.as_chunks().0[block]);
-            }
-        };
-        plane.inverse(support, fill, columns, visit, scratch);
-    }
-
-    /// Multiplies `product`, in rows of `width`, by the transmittance of an object, or assigns it if `FIRST`. Returns
-    /// the number of clipped values.
-    pub(crate) fn transmit<const FIRST: bool>(
+    /// Computes the image of an object: the mean of the absorbed light over each pixel, and of the effect of phase
+    /// delay.
+    ///
+    /// `visit` receives [`ImageStripe`]s that cover the first `width` columns.
+    pub(crate) fn expose(
         &self,
         filter: &Filter,
         spectra: &Spectra,
-        product: &mut [f32],
         width: usize,
-        scratch: &mut LaneScratch,
-    ) -> usize {
-        let add = |block: usize, reach: usize, line: &mut [Lanes]| {
-            self.add((filter, Part::Absorption), &spectra.absorbed, block, reach, line);
-            if filter.is_corrected {
-                self.add((filter, Part::Correction), &spectra.correction, block, reach, line);
-            }
-        };
-        let (norm, mut clipped) = (self.object.plane.norm(), 0);
-        let visit = |left: usize, stripe: &[Lanes]| {
-            clipped += transmit::<FIRST>(product, width, left, stripe, norm);
-        };
-        self.invert(filter.lattice, add, width, visit, scratch);
-        clipped
-    }
-
-    /// Multiplies `product`, in rows of `width`, by the effect of the phase delays of all objects on `lattice`.
-    pub(crate) fn refract<'a>(
-        &self,
-        lattice: Lattice,
-        parts: impl Iterator<Item = (&'a Filter, &'a Spectra)> + Clone,
-        product: &mut [f32],
-        width: usize,
-        scratch: &mut LaneScratch,
+        mut visit: impl FnMut(ImageStripe<'_>),
+        scratch: &mut CanvasScratch,
     ) {
-        let add = |block: usize, reach: usize, line: &mut [Lanes]| {
-            for (filter, spectra) in parts.clone() {
-                self.add((filter, Part::Phase), &spectra.phase, block, reach, line);
+        let Spectra { light, correction } = spectra;
+        if light.is_empty() {
+            return;
+        }
+        let correction = (!correction.is_empty()).then_some(correction);
+        let fill = |block: usize, plus: &mut [Lanes], minus: &mut [Lanes]| {
+            self.image(filter, light, correction, block, plus, minus);
+            if self.is_pixel_mean {
+                let [x, y] = &self.pixel;
+                let (x, y) = (&x.moved[..=self.support.reach(block)], &y.moved.as_chunks().0[block]);
+                mean_over_pixels::<false>(plus, x, y);
+                if !light.minus.is_empty() {
+                    mean_over_pixels::<true>(minus, x, y);
+                }
             }
         };
-        let factor = -2.0 * self.object.plane.norm();
-        let visit = |left: usize, stripe: &[Lanes]| delay(product, width, left, stripe, factor);
-        self.invert(lattice, add, width, visit, scratch);
+        let norm = self.object.norm();
+        let pixels = if light.minus.is_empty() { Pixels::Real } else { Pixels::Complex };
+        let stripe = |left: usize, rows: &mut [Lanes]| visit(ImageStripe { left, pixels, rows, norm });
+        self.camera.inverse(&self.support, pixels, fill, width, stripe, &mut scratch.grid);
     }
 }
 
-/// Rows of samples in a canvas, with a margin of `offset` at the left and at the top.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Samples<'a> {
-    pub(crate) samples: &'a [f32],
-    pub(crate) width: usize,
-    pub(crate) offset: usize,
-    pub(crate) background: f32,
+/// Columns of an image from `left` on, times 1/`norm`, with real and imaginary parts exchanged.
+#[derive(Debug)]
+pub(crate) struct ImageStripe<'a> {
+    left: usize,
+    pixels: Pixels,
+    rows: &'a [Lanes],
+    norm: f32,
 }
 
-#[multiversion(targets = "simd")]
-fn squared(values: &mut [f32], norm: f32, scale: f32) {
-    for value in values {
-        let u = *value * norm;
-        *value = scale * (u * u);
+impl ImageStripe<'_> {
+    /// Adds the stripe to images of absorbed light and of phase effects, in rows of `width`. The first row of the
+    /// stripe is added to the first row of the images, and its column 0 to column `at`. Columns from `end` on are left
+    /// out.
+    pub(crate) fn add_to(&self, absorbed: &mut [f32], phases: &mut [f32], width: usize, at: usize, end: usize) {
+        let columns = |left: usize| (at + left).min(end)..(at + left + LANES).min(end);
+        match self.pixels {
+            Pixels::Complex => {
+                add_columns(absorbed, width, columns(self.left), self.rows, 1, self.norm);
+                add_columns(phases, width, columns(self.left), self.rows, 0, self.norm);
+            }
+            Pixels::Real => {
+                add_columns(absorbed, width, columns(self.left), self.rows, 1, self.norm);
+                add_columns(absorbed, width, columns(self.left + LANES), self.rows, 0, self.norm);
+            }
+        }
     }
 }
 
-/// Replaces a by 1 − T − 2a.
 #[multiversion(targets = "simd")]
-fn twice_less(amplitude: &mut [f32], absorbed: &[f32]) {
-    for (amplitude, absorbed) in amplitude.iter_mut().zip(absorbed) {
-        *amplitude = absorbed - 2.0 * *amplitude;
+fn add_columns(
+    image: &mut [f32],
+    width: usize,
+    columns: core::ops::Range<usize>,
+    rows: &[Lanes],
+    part: usize,
+    norm: f32,
+) {
+    for (image, row) in image.chunks_exact_mut(width).zip(rows) {
+        let image = &mut image[columns.clone()];
+        // Full stripes have a length known at compile time.
+        if let Some(image) = image.first_chunk_mut::<LANES>() {
+            image.iter_mut().zip(&row[part]).for_each(|(image, value)| *image += norm * value);
+        } else {
+            image.iter_mut().zip(&row[part]).for_each(|(image, value)| *image += norm * value);
+        }
     }
 }
 
-/// Multiplies a block by the transfer of the pixel mean, for kx = 0 … and … −1 at its end.
+/// Copies sixteen columns of an image, which has a margin of `offset`, to a part of a stripe. Returns whether the image
+/// has any of them.
+fn fill(image: &[f32], width: usize, offset: usize, left: usize, stripe: &mut [Lanes], part: usize) -> bool {
+    let (first, end) = (left.max(offset), (left + LANES).min(offset + width));
+    let rows = offset..offset + image.len() / width;
+    for (y, row) in stripe.iter_mut().enumerate() {
+        let row = &mut row[part];
+        if !rows.contains(&y) || first >= end {
+            *row = [0.0; LANES];
+            continue;
+        }
+        let from = &image[(y - offset) * width..][first - offset..end - offset];
+        // Full rows have a length known at compile time.
+        match from.first_chunk() {
+            Some(from) => *row = *from,
+            None => {
+                *row = [0.0; LANES];
+                row[first - left..end - left].copy_from_slice(from);
+            }
+        }
+    }
+    first < end
+}
+
+/// Computes a = √T₀ − √T and a² from T₀ − T and T₀, or only a if T₀ is 1, with `behind` and `square` empty.
 #[multiversion(targets = "simd")]
-fn mean_over_pixels(line: &mut [Lanes], x: &[[f32; 2]], y: &[[f32; 2]; LANES]) {
-    let (y_re, y_im) = (y.map(|y| y[0]), y.map(|y| y[1]));
-    let len = line.len();
+fn amplitudes(absorbed: &[f32], behind: &[f32], amplitude: &mut [f32], square: &mut [f32]) {
+    // (T₀ − T)/(√T₀ + √T) is accurate for small absorption.
+    if behind.is_empty() {
+        for (amplitude, absorbed) in amplitude.iter_mut().zip(absorbed) {
+            *amplitude = absorbed / (1.0 + (1.0 - absorbed).max(0.0).sqrt());
+        }
+        return;
+    }
+    for (((amplitude, square), absorbed), behind) in amplitude.iter_mut().zip(square).zip(absorbed).zip(behind) {
+        let sum = behind.sqrt() + (behind - absorbed).max(0.0).sqrt();
+        let a = absorbed / sum.max(f32::MIN_POSITIVE);
+        (*amplitude, *square) = (a, a * a);
+    }
+}
+
+/// Replaces the spectrum of a = 1 − √T by that of a² = 2a − (1 − T), for the spectrum of 1 − T + iφ.
+#[multiversion(targets = "simd")]
+fn squares_of(amplitude: &mut [Lanes], light: &Spectrum) {
+    if light.minus.is_empty() {
+        for (a, light) in amplitude.iter_mut().zip(&light.plus) {
+            for l in 0..LANES {
+                a[0][l] = 2.0 * a[0][l] - light[0][l];
+                a[1][l] = 2.0 * a[1][l] - light[1][l];
+            }
+        }
+        return;
+    }
+    for (a, (plus, minus)) in amplitude.iter_mut().zip(light.plus.iter().zip(&light.minus)) {
+        for l in 0..LANES {
+            a[0][l] = 2.0 * a[0][l] - 0.5 * (plus[0][l] + minus[0][l]);
+            a[1][l] = 2.0 * a[1][l] - 0.5 * (plus[1][l] - minus[1][l]);
+        }
+    }
+}
+
+#[multiversion(targets = "simd")]
+fn subtract(from: &mut [Lanes], values: &[Lanes]) {
+    for (from, value) in from.as_flattened_mut().as_flattened_mut().iter_mut().zip(values.as_flattened().as_flattened())
+    {
+        *from -= value;
+    }
+}
+
+/// Multiplies a block, kx from −r to r, by the transfer of the pixel mean or by its conjugate.
+#[multiversion(targets = "simd")]
+fn mean_over_pixels<const CONJUGATE: bool>(block: &mut [Lanes], x: &[[f32; 2]], y: &[[f32; 2]; LANES]) {
+    let sign = if CONJUGATE { -1.0 } else { 1.0 };
+    let (y_re, y_im) = (y.map(|y| y[0]), y.map(|y| sign * y[1]));
+    let reach = block.len() / 2;
     for (k, &[x_re, x_im]) in x.iter().enumerate() {
-        turn_lanes(&mut line[k], [x_re, x_im], &y_re, &y_im);
+        turn_lanes(&mut block[reach + k], [x_re, sign * x_im], &y_re, &y_im);
         if k > 0 {
-            turn_lanes(&mut line[len - k], [x_re, -x_im], &y_re, &y_im);
+            turn_lanes(&mut block[reach - k], [x_re, -sign * x_im], &y_re, &y_im);
         }
     }
 }
@@ -310,78 +431,32 @@ fn turn_lanes(values: &mut Lanes, x: [f32; 2], y_re: &[f32; LANES], y_im: &[f32;
     }
 }
 
-/// Multiplies a stripe of columns of `product`, in rows of `width`, by 1 − absorbed light, or assigns it if `FIRST`.
-/// Returns the number of clipped values.
+/// Converts absorbed light to transmittance, times exp(−2 · phase effect). `phases` may be empty. Returns the number of
+/// clipped values.
 #[multiversion(targets = "simd")]
-fn transmit<const FIRST: bool>(product: &mut [f32], width: usize, left: usize, lost: &[Lanes], norm: f32) -> usize {
+pub(crate) fn transmit(light: &mut [f32], phases: &[f32]) -> usize {
     let mut clipped = 0_u32;
-    for (row, lost) in product.chunks_exact_mut(width).zip(lost) {
-        for (product, lost) in row[left..].iter_mut().zip(lost.as_flattened()) {
-            let light = 1.0 - lost * norm;
-            clipped += u32::from(light < MIN_TRANSMITTANCE);
-            let light = light.max(MIN_TRANSMITTANCE);
-            *product = if FIRST { light } else { *product * light };
-        }
+    for light in light.iter_mut() {
+        let transmitted = 1.0 - *light;
+        clipped += u32::from(transmitted < MIN_TRANSMITTANCE);
+        *light = transmitted.max(MIN_TRANSMITTANCE);
+    }
+    for (light, phase) in light.iter_mut().zip(phases) {
+        *light *= exp_f32(-2.0 * phase);
     }
     clipped as usize
 }
 
-/// Multiplies a stripe by exp(factor · v).
+/// Converts absorbance A to 1 − T = 1 − 10^(−A) (Eq. 11).
 #[multiversion(targets = "simd")]
-fn delay(product: &mut [f32], width: usize, left: usize, phases: &[Lanes], factor: f32) {
-    for (row, phases) in product.chunks_exact_mut(width).zip(phases) {
-        for (product, v) in row[left..].iter_mut().zip(phases.as_flattened()) {
-            *product *= exp_f32(factor * v);
-        }
-    }
-}
-
-/// Converts 1 − T to 1 − √T.
-#[multiversion(targets = "simd")]
-fn amplitude(line: &mut [f32]) {
-    for v in line {
-        // (1 − T)/(1 + √T) is accurate for small absorption.
-        *v /= 1.0 + (1.0 - *v).max(0.0).sqrt();
-    }
-}
-
-/// Converts absorbance A to 1 − T = 1 − 10^(−A) (Eq. 11). Returns whether any value is not 0.
-#[multiversion(targets = "simd")]
-pub(crate) fn absorbed(values: &mut [f32]) -> bool {
-    let nonzero = is_nonzero(values);
-    if nonzero {
-        for value in values {
-            *value = 1.0 - exp_f32(-*value * core::f32::consts::LN_10);
-        }
-    }
-    nonzero
-}
-
-/// Converts T to 1 − T. Returns whether any value is not 0.
-#[multiversion(targets = "simd")]
-pub(crate) fn absorbed_of(values: &mut [f32]) -> bool {
-    let mut nonzero = 0_u32;
-    for value in values {
-        *value = 1.0 - *value;
-        nonzero |= value.to_bits();
-    }
-    nonzero != 0
-}
-
-/// Returns a conversion to 1 − √T, from one to 1 − T.
-pub(crate) fn amplitude_of(absorbed: impl Fn(&mut [f32]) -> bool) -> impl Fn(&mut [f32]) -> bool {
-    move |values| {
-        let nonzero = absorbed(values);
-        if nonzero {
-            amplitude(values);
-        }
-        nonzero
-    }
+pub(crate) fn absorbed(absorbance: &[f32], absorbed: &mut Vec<f32>) {
+    absorbed.clear();
+    absorbed.extend(absorbance.iter().map(|a| 1.0 - exp_f32(-*a * core::f32::consts::LN_10)));
 }
 
 /// Returns whether any value is not 0.
 #[multiversion(targets = "simd")]
-pub(crate) fn is_nonzero(values: &mut [f32]) -> bool {
+pub(crate) fn is_nonzero(values: &[f32]) -> bool {
     values.iter().fold(0, |nonzero, value| nonzero | (value.to_bits() << 1)) != 0
 }
 
@@ -395,10 +470,10 @@ mod tests {
         for (na, condenser_na) in [(0.95, 0.41), (0.65, 0.65), (0.9, 0.3)] {
             let params = MicroscopeParams { na, condenser_na, ..MicroscopeParams::default() };
             let (microscope, plans) = (Microscope::new(&params).unwrap(), LanePlans::default());
-            let sparse = Canvas::new(&microscope, [240, 192], &plans);
-            let mut full = Canvas::new(&microscope, [240, 192], &plans);
+            let sparse = Canvas::new(&microscope, [120, 96], 2, &plans);
+            let mut full = Canvas::new(&microscope, [120, 96], 2, &plans);
             assert_eq!(sparse.squares.width, 180);
-            full.squares = full.object.plane.clone();
+            full.squares = full.object.clone();
             // Sharp and nearly opaque: a disc, a bar and specks of one sample.
             let (width, height) = (160, 120);
             let sample = |i: usize| {
@@ -406,22 +481,22 @@ mod tests {
                 let disc = x.abs_diff(50).pow(2) + y.abs_diff(60).pow(2) < 900;
                 let bar = (x + y).is_multiple_of(7) && x > 110;
                 let speck = x.is_multiple_of(11) && y.is_multiple_of(13);
-                if disc || bar || speck { 0.02 } else { 0.8 }
+                if disc || bar || speck { 0.98 } else { 0.2 }
             };
-            let samples: Vec<f32> = (0..width * height).map(sample).collect();
-            let samples = Samples { samples: &samples, width, offset: 32, background: 1.0 };
+            let absorbed: Vec<f32> = (0..width * height).map(sample).collect();
+            let samples = Samples { absorbed: &absorbed, behind: &[], phase: &[], width, offset: 32 };
             let in_focus = Filter::in_focus(&microscope);
             for depth in [0.0, 0.9] {
                 let transfer = Transfer::new(&microscope, depth, 0.0);
                 let filter = Filter::new(&microscope, depth, 0.0, &transfer);
                 let light = |canvas: &Canvas| {
-                    let (mut spectra, mut scratch) = (Spectra::default(), LaneScratch::default());
-                    canvas.transform(samples, absorbed_of, &mut spectra.absorbed, &mut scratch);
-                    canvas.transform(samples, amplitude_of(absorbed_of), &mut spectra.amplitude, &mut scratch);
-                    canvas.correct(&in_focus, &mut spectra, &mut scratch);
-                    let mut product = vec![1.0; 240 * 192];
-                    canvas.transmit::<false>(&filter, &spectra, &mut product, 240, &mut scratch);
-                    product
+                    let (mut spectra, mut scratch) = (Spectra::default(), CanvasScratch::default());
+                    canvas.load(samples, &mut spectra, &mut scratch);
+                    canvas.correct(&in_focus, samples, &mut spectra, &mut scratch);
+                    let mut absorbed = vec![0.0; 120 * 96];
+                    let add = |stripe: ImageStripe<'_>| stripe.add_to(&mut absorbed, &mut [], 120, 0, 120);
+                    canvas.expose(&filter, &spectra, 120, add, &mut scratch);
+                    absorbed
                 };
                 let (found, expected) = (light(&sparse), light(&full));
                 let error = found.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);

@@ -4,11 +4,11 @@ use multiversion::multiversion;
 use num_complex::Complex32;
 
 use crate::Microscope;
-use crate::lane_plane::{LANES, Lanes};
+use crate::spectrum::{LANES, Lanes, ZERO};
 use crate::transfer::{ASYMMETRIC_SAMPLES, Transfer, corners, fade};
 
 /// Defocus in µm of mountant up to which the in-focus correction has full weight, and from which it has none. Its
-/// effect is small at 1 µm and zero from 2 µm on, where the camera's lattice may be used.
+/// effect is small at 1 µm.
 const CORRECTED_UM: [f64; 2] = [1.0, 2.0];
 
 /// Fraction of the correction lost at a full condenser aperture, where twice-scattered light interferes less. Fitted to
@@ -18,26 +18,12 @@ const SCATTERED_APART: f64 = 0.4;
 /// Start of the taper of the correction's spectrum, as a fraction of the cutoff. A sharp cut would ring at edges.
 const TAPER_FROM: f64 = 0.75;
 
-/// Largest transfer at sub-pixel frequencies for which the camera's lattice is used.
-const SMOOTH_TRANSFER: f64 = 0.05;
-
 /// Smallest divisor of the restoring filter. Weaker frequencies of an image are mostly noise.
 const LEAST_TRANSFER: f32 = 0.1;
-
-/// Sampling lattice of a transmission factor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum Lattice {
-    /// The object's lattice, with [`oversampling`](crate::MicroscopeParams::oversampling) samples per pixel side.
-    Object,
-    /// The camera's lattice; each value is the mean over a pixel.
-    #[default]
-    Camera,
-}
 
 /// Filter of one depth and stage position.
 #[derive(Debug, Clone)]
 pub(crate) struct Filter {
-    pub(crate) lattice: Lattice,
     /// Whether the in-focus correction is applied.
     pub(crate) is_corrected: bool,
     response: Response,
@@ -56,17 +42,6 @@ const ENTRIES: usize = 512;
 
 /// Values at multiples of a frequency, each with the difference to the next, padded with zeros.
 type Table = [[f32; 2]; ENTRIES];
-
-/// The three responses of a filter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Part {
-    /// H_A, the response to absorption.
-    Absorption,
-    /// H_P, the response to phase delay.
-    Phase,
-    /// −G, the in-focus correction; the sign converts transmitted to absorbed light.
-    Correction,
-}
 
 /// Frequencies of a block of a spectrum, in steps of the filter's table, and the transfer of the pixel mean.
 #[derive(Debug, Clone, Copy)]
@@ -89,20 +64,17 @@ impl Filter {
         let coherent = 1.0 - SCATTERED_APART * incoherence(params.condenser_na / params.na);
         let weight = coherent * fade((defocus - whole) / (gone - whole));
         let (radius, cutoff) = (microscope.cone_radius_um(depth_um, stage_um), microscope.cutoff());
-        let nyquist = 0.5 / params.pixel_um;
-        let is_smooth = params.oversampling > 1 && defocus >= gone && transfer.extent(SMOOTH_TRANSFER) <= nyquist;
-        let lattice = if is_smooth { Lattice::Camera } else { Lattice::Object };
         let correction =
             |f: f64| -weight * pillbox(TAU * f * radius) * fade((f / cutoff - TAPER_FROM) / (1.0 - TAPER_FROM));
         let correction = |f: f64| if weight > 0.0 { correction(f) } else { 0.0 };
         let response = Response::new(transfer, correction);
-        Self { lattice, is_corrected: weight > 0.0, response, restores: false }
+        Self { is_corrected: weight > 0.0, response, restores: false }
     }
 
     /// Returns the filter of the in-focus transfer function, without correction.
     pub(crate) fn in_focus(microscope: &Microscope) -> Self {
         let response = Response::new(&Transfer::new(microscope, 0.0, 0.0), |_| 0.0);
-        Self { lattice: Lattice::Object, is_corrected: false, response, restores: false }
+        Self { is_corrected: false, response, restores: false }
     }
 
     /// Turns the filter into one for objects that were already imaged in focus, through `in_focus` and the camera
@@ -120,103 +92,155 @@ impl Filter {
         (self.is_corrected, self.restores) = (false, true);
     }
 
-    /// Adds a block of a spectrum times a response to `sum`, for kx from −`reach` to `reach`. Negative kx are at the
-    /// end of both slices.
-    pub(crate) fn add(&self, part: Part, at: Block<'_>, spectrum: &[Lanes], reach: usize, sum: &mut [Lanes]) {
+    /// Computes the image of a block: absorbed light as the real part, the effect of phase delay as the imaginary part.
+    ///
+    /// With responses W to absorption and H to phase delay, a spectrum F of absorbed light + i · phase delay becomes
+    /// (W + H)/2 · F(k) + (W − H)/2 · F*(−k). The spectrum of a correction is added times −G.
+    pub(crate) fn image(&self, at: Block<'_>, from: &BlockSpectrum<'_>, plus: &mut [Lanes], minus: &mut [Lanes]) {
         match &self.response {
-            Response::Round(tables) if self.restores => {
-                add_restored(&tables[part as usize], &tables[2], at, spectrum, reach, sum);
+            Response::Round(tables) => {
+                let correction = from.correction.filter(|_| self.is_corrected);
+                match (from.minus.is_empty(), correction) {
+                    (true, None) => round::<true, false>(tables, self.restores, at, from, plus, minus),
+                    (true, Some(_)) => round::<true, true>(tables, self.restores, at, from, plus, minus),
+                    (false, None) => round::<false, false>(tables, self.restores, at, from, plus, minus),
+                    (false, Some(_)) => round::<false, true>(tables, self.restores, at, from, plus, minus),
+                }
             }
-            Response::Round(tables) => add_round(&tables[part as usize], at, spectrum, reach, sum),
-            Response::Sided(table) => {
-                let [from_end, to_end] = [spectrum.len(), sum.len()];
-                let mut one = |from: usize, to: usize, x: f32, pixel_x: f32| {
-                    for l in 0..LANES {
-                        let entry = sided(table, x, at.y[l]);
-                        let mut weight = entry[part as usize];
-                        if self.restores {
-                            let in_focus = entry[2] * (pixel_x * at.pixel_y[l]);
-                            let size = in_focus.norm_sqr().sqrt();
-                            weight =
-                                weight * in_focus.conj() / (size * size.max(LEAST_TRANSFER)).max(f32::MIN_POSITIVE);
-                        }
-                        let value = Complex32::new(spectrum[from][0][l], spectrum[from][1][l]) * weight;
-                        sum[to][0][l] += value.re;
-                        sum[to][1][l] += value.im;
-                    }
+            Response::Sided(table) => self.sided_image(table, at, from, plus, minus),
+        }
+    }
+
+    fn sided_image(
+        &self,
+        table: &[[Complex32; 3]],
+        at: Block<'_>,
+        from: &BlockSpectrum<'_>,
+        plus: &mut [Lanes],
+        minus: &mut [Lanes],
+    ) {
+        let reach = plus.len() / 2;
+        for i in 0..plus.len() {
+            let k = i.abs_diff(reach);
+            let x = k as f32 * at.step_x;
+            for l in 0..LANES {
+                let mut weights = sided(table, if i < reach { -x } else { x }, at.y[l]);
+                if self.restores {
+                    let in_focus = weights[2] * (at.pixel_x[k] * at.pixel_y[l]);
+                    let size = in_focus.norm_sqr().sqrt();
+                    let inverse = in_focus.conj() / (size * size.max(LEAST_TRANSFER)).max(f32::MIN_POSITIVE);
+                    (weights[0], weights[1]) = (weights[0] * inverse, weights[1] * inverse);
+                }
+                let complex = |lanes: &Lanes| Complex32::new(lanes[0][l], lanes[1][l]);
+                let f = complex(&from.plus[i]);
+                // F*(−k), which is F(k) for a real image.
+                let mirrored = from.minus.get(i).map_or(f, |lanes| complex(lanes).conj());
+                let [half_sum, half_difference] = [0.5 * (weights[0] + weights[1]), 0.5 * (weights[0] - weights[1])];
+                let correction = match from.correction {
+                    Some(correction) if self.is_corrected => weights[2] * complex(&correction[i]),
+                    _ => Complex32::ZERO,
                 };
-                for k in 0..=reach {
-                    let (x, pixel_x) = (k as f32 * at.step_x, at.pixel_x[k]);
-                    one(k, k, x, pixel_x);
-                    if k > 0 {
-                        one(from_end - k, to_end - k, -x, pixel_x);
-                    }
+                let above = half_sum * f + half_difference * mirrored + correction;
+                (plus[i][0][l], plus[i][1][l]) = (above.re, above.im);
+                if !from.minus.is_empty() {
+                    let below = (half_sum * mirrored + half_difference * f + correction).conj();
+                    (minus[i][0][l], minus[i][1][l]) = (below.re, below.im);
                 }
             }
         }
     }
 }
 
+/// A block of the spectrum of an object.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct BlockSpectrum<'a> {
+    /// F(kx, ky), for kx from −r to r.
+    pub(crate) plus: &'a [Lanes],
+    /// F(−kx, −ky); empty for a real image.
+    pub(crate) minus: &'a [Lanes],
+    /// Spectrum of a real image that is added times −G.
+    pub(crate) correction: Option<&'a [Lanes]>,
+}
+
+/// [`Filter::image`] for a round pupil, whose responses are real and even.
 #[multiversion(targets = "simd")]
-fn add_round(table: &Table, at: Block<'_>, spectrum: &[Lanes], reach: usize, sum: &mut [Lanes]) {
+fn round<const REAL: bool, const CORRECTED: bool>(
+    [absorption, phase, last]: &[Table; 3],
+    restores: bool,
+    at: Block<'_>,
+    from: &BlockSpectrum<'_>,
+    plus: &mut [Lanes],
+    minus: &mut [Lanes],
+) {
     let y2 = at.y.map(|y| y * y);
+    let reach = plus.len() / 2;
     for k in 0..=reach {
-        accumulate(&entries(table, k, at.step_x, &y2), k, spectrum, sum);
-    }
-}
-
-/// Divides by the in-focus transfer of lens and pixels.
-#[multiversion(targets = "simd")]
-fn add_restored(table: &Table, focused: &Table, at: Block<'_>, spectrum: &[Lanes], reach: usize, sum: &mut [Lanes]) {
-    let y2 = at.y.map(|y| y * y);
-    for k in 0..=reach {
-        let mut weights = entries(table, k, at.step_x, &y2);
-        let in_focus = entries(focused, k, at.step_x, &y2);
-        for ((weight, in_focus), pixel_y) in weights.iter_mut().zip(&in_focus).zip(at.pixel_y) {
-            *weight /= (in_focus * at.pixel_x[k] * pixel_y).max(LEAST_TRANSFER);
+        let place = TablePlaces::new(k, at.step_x, &y2);
+        let mut w = place.entries(absorption);
+        let mut h = if REAL { [0.0; LANES] } else { place.entries(phase) };
+        let g = if CORRECTED { place.entries(last) } else { [0.0; LANES] };
+        if restores {
+            let in_focus = place.entries(last);
+            for l in 0..LANES {
+                let divisor = (in_focus[l] * at.pixel_x[k] * at.pixel_y[l]).max(LEAST_TRANSFER);
+                (w[l], h[l]) = (w[l] / divisor, h[l] / divisor);
+            }
         }
-        accumulate(&weights, k, spectrum, sum);
-    }
-}
-
-#[inline(always)]
-fn accumulate(weights: &[f32; LANES], k: usize, spectrum: &[Lanes], sum: &mut [Lanes]) {
-    let [last_from, last_to] = [spectrum.len() - k, sum.len() - k];
-    weigh(weights, &spectrum[k], &mut sum[k]);
-    if k > 0 {
-        weigh(weights, &spectrum[last_from], &mut sum[last_to]);
-    }
-}
-
-#[inline(always)]
-fn weigh(weights: &[f32; LANES], from: &Lanes, to: &mut Lanes) {
-    for (to, from) in to.iter_mut().zip(from) {
-        for ((to, from), weight) in to.iter_mut().zip(from).zip(weights) {
-            *to += from * weight;
+        for i in [reach - k, reach + k] {
+            let f = &from.plus[i];
+            let c = from.correction.filter(|_| CORRECTED).map_or(&ZERO, |correction| &correction[i]);
+            if REAL {
+                for l in 0..LANES {
+                    plus[i][0][l] = w[l] * f[0][l] + g[l] * c[0][l];
+                    plus[i][1][l] = w[l] * f[1][l] + g[l] * c[1][l];
+                }
+                continue;
+            }
+            let m = &from.minus[i];
+            for l in 0..LANES {
+                let (sum, difference) = (0.5 * (w[l] + h[l]), 0.5 * (w[l] - h[l]));
+                plus[i][0][l] = sum * f[0][l] + difference * m[0][l] + g[l] * c[0][l];
+                plus[i][1][l] = sum * f[1][l] - difference * m[1][l] + g[l] * c[1][l];
+                minus[i][0][l] = sum * m[0][l] + difference * f[0][l] + g[l] * c[0][l];
+                minus[i][1][l] = sum * m[1][l] - difference * f[1][l] - g[l] * c[1][l];
+            }
         }
     }
 }
 
-/// Returns table values for a block, by linear interpolation.
-#[inline(always)]
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "indices of the table")]
-fn entries(table: &Table, k: usize, step_x: f32, y2: &[f32; LANES]) -> [f32; LANES] {
-    let x = k as u32 as f32 * step_x;
-    let x2 = x * x;
-    // Signed integers convert faster.
-    let mut places = [0_i32; LANES];
-    let mut parts = [0.0; LANES];
-    for ((place, part), y2) in places.iter_mut().zip(&mut parts).zip(y2) {
-        let position = (x2 + y2).sqrt().min((ENTRIES - 1) as f32);
-        *place = position as i32;
-        *part = position - *place as f32;
+/// Positions in the tables of the frequencies of a block.
+struct TablePlaces {
+    /// Signed integers convert faster.
+    places: [i32; LANES],
+    parts: [f32; LANES],
+}
+
+impl TablePlaces {
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "indices of the table")]
+    fn new(k: usize, step_x: f32, y2: &[f32; LANES]) -> Self {
+        let x = k as u32 as f32 * step_x;
+        let x2 = x * x;
+        let (mut places, mut parts) = ([0; LANES], [0.0; LANES]);
+        for ((place, part), y2) in places.iter_mut().zip(&mut parts).zip(y2) {
+            let position = (x2 + y2).sqrt().min((ENTRIES - 1) as f32);
+            *place = position as i32;
+            *part = position - *place as f32;
+        }
+        Self { places, parts }
     }
-    let mut values = [0.0; LANES];
-    for ((value, place), part) in values.iter_mut().zip(&places).zip(&parts) {
-        let [from, rise] = table[*place as usize % ENTRIES];
-        *value = from + part * rise;
+
+    /// Returns values of a table, by linear interpolation.
+    #[inline(always)]
+    #[expect(clippy::cast_sign_loss, reason = "indices of the table")]
+    fn entries(&self, table: &Table) -> [f32; LANES] {
+        let mut values = [0.0; LANES];
+        for ((value, place), part) in values.iter_mut().zip(&self.places).zip(&self.parts) {
+            let [from, rise] = table[*place as usize % ENTRIES];
+            *value = from + part * rise;
+        }
+        values
     }
-    values
 }
 
 /// Returns the three responses at a frequency.

@@ -1,6 +1,6 @@
 use crate::error::{Error, require, within};
 use crate::microscope::distance;
-use crate::overlap::QuadratureRules;
+use crate::overlap::quadrature_rule;
 use crate::pupil::turn;
 
 /// Parameters of [`GibsonLanni`]: design and actual values of the optical path.
@@ -104,8 +104,7 @@ impl GibsonLanni {
         let most = z_um.iter().map(fringes).fold(0.0, f64::max) + rings;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "float to integer casts saturate")]
         let nodes = NODES.0 + (most * NODES.1) as usize;
-        let mut rules = QuadratureRules::default();
-        let rule = rules.get(nodes);
+        let rule = quadrature_rule(nodes);
         // Wavefront phases per node and z, and Bessel functions per node and r.
         let wave = |&z: &f64| rule.iter().map(|&[rho, _]| turn(self.waves(rho, z) - self.waves(0.0, z))).collect();
         let waves: Vec<Vec<(f64, f64)>> = z_um.iter().map(wave).collect();

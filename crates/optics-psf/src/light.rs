@@ -1,18 +1,13 @@
 use multiversion::multiversion;
 
-use crate::{Factor, Lattice, Microscope};
+use crate::{Factor, Microscope};
 
 /// The transmitted light of an image: the product of the transmission factors of many objects.
-///
-/// Factors on the object's lattice are multiplied there and averaged per pixel at the end. Factors on the camera's
-/// lattice are multiplied per pixel.
 #[derive(Debug, Clone, Default)]
 pub struct TransmittedLight {
-    oversampling: usize,
     width_px: usize,
     stray_light: f64,
-    object: Vec<f32>,
-    camera: Vec<f32>,
+    product: Vec<f32>,
 }
 
 impl TransmittedLight {
@@ -26,38 +21,26 @@ impl TransmittedLight {
 
     /// Resets to the light of an empty slide, possibly of another microscope and size, and reuses the memory.
     pub fn reset(&mut self, microscope: &Microscope, width_px: usize, height_px: usize) {
-        let params = microscope.params();
-        (self.oversampling, self.width_px, self.stray_light) = (params.oversampling, width_px, params.stray_light);
-        let pixels = width_px * height_px;
-        for (lattice, samples) in
-            [(&mut self.object, pixels * params.oversampling * params.oversampling), (&mut self.camera, pixels)]
-        {
-            lattice.clear();
-            lattice.resize(samples, 1.0);
-        }
+        (self.width_px, self.stray_light) = (width_px, microscope.params().stray_light);
+        self.product.clear();
+        self.product.resize(width_px * height_px, 1.0);
     }
 
     /// Resets to the light of an empty slide.
     pub fn clear(&mut self) {
-        self.object.fill(1.0);
-        self.camera.fill(1.0);
+        self.product.fill(1.0);
     }
 
     /// Multiplies by the factor of a patch. `at_px` is the pixel position of the patch's upper left corner, without the
     /// margin. Parts outside of the image are ignored.
     pub fn multiply(&mut self, factor: &Factor, at_px: [i64; 2]) {
-        let (light, scale) = match factor.lattice {
-            Lattice::Object => (&mut self.object, self.oversampling),
-            Lattice::Camera => (&mut self.camera, 1),
-        };
-        let width = self.width_px * scale;
+        let (light, width) = (&mut self.product, self.width_px);
         let (Some(height), Some(factor_height)) =
             (light.len().checked_div(width), factor.values.len().checked_div(factor.width))
         else {
             return;
         };
-        let place =
-            |at: i64, len: usize, side: usize| overlap((at - factor.margin_px as i64) * scale as i64, len, side);
+        let place = |at: i64, len: usize, side: usize| overlap(at - factor.margin_px as i64, len, side);
         let (from_x, to_x, columns) = place(at_px[0], factor.width, width);
         let (from_y, to_y, rows) = place(at_px[1], factor_height, height);
         for row in 0..rows {
@@ -73,16 +56,13 @@ impl TransmittedLight {
     ///
     /// If `out` does not have as many pixels as the image.
     pub fn image_into(&self, out: &mut [f32]) {
-        out.copy_from_slice(&self.camera);
-        if self.width_px > 0 {
-            mean_of_pixels(&self.object, self.width_px * self.oversampling, self.oversampling, out);
-        }
+        out.copy_from_slice(&self.product);
         add_stray_light(out, self.stray_light);
     }
 }
 
 #[multiversion(targets = "simd")]
-fn times(light: &mut [f32], values: &[f32]) {
+pub(crate) fn times(light: &mut [f32], values: &[f32]) {
     light.iter_mut().zip(values).for_each(|(light, value)| *light *= value);
 }
 
@@ -93,28 +73,6 @@ fn overlap(at: i64, len: usize, side: usize) -> (usize, usize, usize) {
     let first = (-at).max(0);
     let end = (side as i64 - at).min(len as i64);
     if end <= first { (0, 0, 0) } else { (first as usize, (at + first) as usize, (end - first) as usize) }
-}
-
-/// Multiplies `out` by the mean over the samples of each pixel.
-#[multiversion(targets = "simd")]
-pub(crate) fn mean_of_pixels(samples: &[f32], width: usize, oversampling: usize, out: &mut [f32]) {
-    let n = oversampling;
-    #[expect(clippy::cast_possible_truncation, reason = "at most 256 samples")]
-    let weight = (1.0 / (n * n) as f64) as f32;
-    for (out, rows) in out.chunks_exact_mut(width / n).zip(samples.chunks_exact(width * n)) {
-        if n == 2 {
-            let (above, below) = rows.split_at(width);
-            for (out, (a, b)) in out.iter_mut().zip(above.as_chunks().0.iter().zip(below.as_chunks().0)) {
-                let ([a, b], [c, d]): (&[f32; 2], &[f32; 2]) = (a, b);
-                *out *= ((a + b) + (c + d)) * weight;
-            }
-            continue;
-        }
-        for (x, out) in out.iter_mut().enumerate() {
-            let pixel = rows.chunks_exact(width).map(|row| row[x * n..(x + 1) * n].iter().sum::<f32>());
-            *out *= pixel.sum::<f32>() * weight;
-        }
-    }
 }
 
 /// Adds stray light, as a fraction of the light of an empty slide.

@@ -1,5 +1,5 @@
 use crate::error::{Error, require, within};
-use crate::overlap::QuadratureRules;
+use crate::overlap::quadrature_rule;
 use crate::params::{MicroscopeParams, Zernike};
 use crate::pupil::Pupil;
 
@@ -103,9 +103,7 @@ impl Microscope {
         let shift = 0.5 * width / centre * (self.params.na / self.params.condenser_na).max(1.0);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small, and limited by the rule")]
         let nodes = 2 * (BAND_NODES[0] + BAND_NODES[1] * shift).ceil() as usize;
-        let mut rules = QuadratureRules::default();
-        let rule = rules.get(nodes).iter();
-        rule.map(|&[x, weight]| (centre + width * (x - 0.5), weight)).collect()
+        quadrature_rule(nodes).iter().map(|&[x, weight]| (centre + width * (x - 0.5), weight)).collect()
     }
 }
 

@@ -1,4 +1,5 @@
 use core::f64::consts::PI;
+use std::sync::OnceLock;
 
 use crate::pupil::{Pupil, turn};
 
@@ -11,7 +12,6 @@ use crate::pupil::{Pupil, turn};
 /// of the integrand. For a rotationally symmetric pupil, half of the overlap suffices.
 #[derive(Debug, Default)]
 pub(crate) struct OverlapIntegral {
-    rules: QuadratureRules,
     /// Coordinates and weights of the nodes.
     x: Vec<f64>,
     y: Vec<f64>,
@@ -58,15 +58,14 @@ impl OverlapIntegral {
         };
         let width = split - end;
         let fringes = difference(split, 0.0) - difference(end, 0.0);
-        let along = self.rules.get(node_count(fringes, ALONG)).to_vec();
-        for [t, w] in along {
+        for &[t, w] in quadrature_rule(node_count(fringes, ALONG)) {
             let x = end + width * t * t;
             let weight = 2.0 * width.abs() * t * w;
             let height = half_height(x);
             let axis = difference(x, 0.0);
             let fringes = (difference(x, height) - axis).abs() + (difference(x, -height) - axis).abs();
             // The upper half of an even rule covers 0..1 of the half height.
-            let across = self.rules.get(node_count(fringes, ACROSS) * 2);
+            let across = quadrature_rule(node_count(fringes, ACROSS) * 2);
             for &[u, v] in &across[across.len() / 2..] {
                 let y = height * (2.0 * u - 1.0);
                 let weight = weight * 2.0 * height * v;
@@ -87,25 +86,12 @@ impl OverlapIntegral {
 /// Largest rule. A pupil with more fringes transfers nothing.
 const LONGEST: usize = 1024;
 
-/// Gauss–Legendre rules on 0..1 with 2, 4, … nodes, computed on demand.
-#[derive(Debug, Default)]
-pub(crate) struct QuadratureRules {
-    cached: Vec<Vec<[f64; 2]>>,
-}
-
-impl QuadratureRules {
-    /// Returns nodes and weights of a rule with at least `nodes` nodes, an even number, in ascending order.
-    pub(crate) fn get(&mut self, nodes: usize) -> &[[f64; 2]] {
-        let half = nodes.clamp(2, LONGEST).div_ceil(2);
-        if self.cached.len() <= half {
-            self.cached.resize(half + 1, Vec::new());
-        }
-        let rule = &mut self.cached[half];
-        if rule.is_empty() {
-            *rule = gauss_legendre(2 * half);
-        }
-        rule
-    }
+/// Returns nodes and weights on 0..1 of a Gauss–Legendre rule with at least `nodes` nodes, an even number, in ascending
+/// order. Each rule is computed once.
+pub(crate) fn quadrature_rule(nodes: usize) -> &'static [[f64; 2]] {
+    static RULES: [OnceLock<Vec<[f64; 2]>>; LONGEST / 2 + 1] = [const { OnceLock::new() }; LONGEST / 2 + 1];
+    let half = nodes.clamp(2, LONGEST).div_ceil(2);
+    RULES[half].get_or_init(|| gauss_legendre(2 * half))
 }
 
 /// Computes a rule by Newton's method on the Legendre polynomial of degree `n`.
@@ -225,9 +211,8 @@ mod tests {
 
     #[test]
     fn quadrature_rules_are_exact_for_polynomials() {
-        let mut rules = QuadratureRules::default();
         for nodes in [2, 4, 7, 16, 64, 300] {
-            let rule = rules.get(nodes);
+            let rule = quadrature_rule(nodes);
             assert!(rule.len() >= nodes && rule.len() % 2 == 0);
             for degree in 0..(2 * rule.len()).min(40) {
                 let power = |x: f64| (0..degree).fold(1.0, |p, _| p * x);
@@ -235,6 +220,6 @@ mod tests {
                 assert!((integral * (degree as f64 + 1.0) - 1.0).abs() < 1e-12, "{nodes} {degree}: {integral}");
             }
         }
-        assert_eq!(rules.get(100_000).len(), LONGEST);
+        assert_eq!(quadrature_rule(100_000).len(), LONGEST);
     }
 }

@@ -2,11 +2,11 @@ use core::ops::RangeInclusive;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::canvas::{Canvas, Samples, Spectra, absorbed_of, amplitude_of, is_nonzero};
-use crate::filter::{Filter, Lattice, incoherence};
+use crate::canvas::{Canvas, CanvasScratch, Samples, Spectra, is_nonzero, transmit};
+use crate::filter::{Filter, incoherence};
 use crate::grid::fast_length;
-use crate::lane_plane::{LanePlans, LaneScratch};
 use crate::microscope::distance;
+use crate::spectrum::LanePlans;
 use crate::{Error, Microscope, Transfer};
 
 /// Renders a slide patch by patch: each patch is at one depth and gives a transmission factor of the light around it.
@@ -14,7 +14,8 @@ use crate::{Error, Microscope, Transfer};
 pub struct PatchImager {
     transfers: TransferCache,
     plans: Arc<LanePlans>,
-    canvases: Mutex<BTreeMap<[usize; 2], Arc<Canvas>>>,
+    /// Canvases by size in pixels and samples per pixel.
+    canvases: Mutex<BTreeMap<([usize; 2], usize), Arc<Canvas>>>,
     in_focus: Filter,
 }
 
@@ -39,23 +40,58 @@ impl Focus {
     pub fn defocus_um(&self) -> f64 {
         self.defocus_um
     }
+}
 
-    /// Returns the sampling lattice of the factors.
-    #[must_use]
-    pub fn lattice(&self) -> Lattice {
-        self.filter.lattice
-    }
+/// A part of an object on a [`Patch`], sampled once or several times per pixel.
+///
+/// The parts of one object are imaged together: their absorbed light is added before it is subtracted from the light of
+/// the empty slide. A cell is smooth except in its nucleus: one sample per pixel for the cytoplasm and several for the
+/// nucleus take a fraction of the time of several for both.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct PatchLayer<'a> {
+    /// Transmittance, 0 to 1, including that of `behind`, in rows from the top.
+    pub transmittance: &'a [f32],
+    /// Transmittance of other parts of the object at the same samples; empty if there are none.
+    pub behind: &'a [f32],
+    /// Phase delay in radians; empty if there is none.
+    pub phase_rad: &'a [f32],
+    /// Samples per row.
+    pub width: usize,
+    /// Samples per pixel and axis. If they are fewer than the oversampling, each must be the mean of the points in its
+    /// square, interpolated by Catmull–Rom cubics from a smooth object.
+    pub samples_per_pixel: usize,
+    /// Upper left pixel in the patch.
+    pub at_px: [usize; 2],
 }
 
 /// A small rectangle of the slide at one depth, with cached spectra for each margin.
 #[derive(Debug, Clone, Default)]
 pub struct Patch {
-    width: usize,
-    transmittance: Vec<f32>,
-    phase_rad: Vec<f32>,
+    size_px: [usize; 2],
+    layers: Vec<LoadedLayer>,
     plans: Option<Arc<LanePlans>>,
+}
+
+impl Patch {
+    /// Returns the number of layers.
+    #[must_use]
+    pub fn layers(&self) -> usize {
+        self.layers.len()
+    }
+}
+
+/// A copy of a [`PatchLayer`], with its spectra.
+#[derive(Debug, Clone, Default)]
+struct LoadedLayer {
+    absorbed: Vec<f32>,
+    behind: Vec<f32>,
+    phase: Vec<f32>,
+    width: usize,
+    samples_per_pixel: usize,
+    at_px: [usize; 2],
+    is_empty: bool,
     padded: Vec<PaddedSpectra>,
-    /// Number of entries of `padded` that belong to this patch; the others are left from earlier patches.
+    /// Number of entries of `padded` that belong to this layer; the others are left from earlier ones.
     fresh: usize,
 }
 
@@ -68,14 +104,15 @@ struct PaddedSpectra {
 
 /// Working memory of [`PatchImager`], one per thread.
 #[derive(Debug, Clone, Default)]
-pub struct PatchScratch(LaneScratch);
+pub struct PatchScratch {
+    canvas: CanvasScratch,
+    phases: Vec<f32>,
+}
 
-/// Transmission factor of a patch: light relative to an empty slide.
+/// Transmission factor of a patch: light relative to an empty slide, as the mean over each camera pixel.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Factor {
-    /// Sampling lattice of `values`.
-    pub lattice: Lattice,
-    /// Values per row: the patch with the margin on both sides.
+    /// Pixels per row: the patch with the margin on both sides.
     pub width: usize,
     /// Values in row-major order from the top.
     pub values: Vec<f32>,
@@ -88,7 +125,7 @@ pub struct Factor {
 /// Reach of the light: a multiple of the cone's radius plus a multiple of λ/NA, which grows with the condenser's
 /// aperture. At most about a thousandth of the contrast lies outside, in the median two ten-thousandths.
 const CONES: f64 = 1.4;
-const FRINGES: f64 = 3.75;
+const FRINGES: f64 = 3.9;
 const OPEN_FRINGES: f64 = 2.25;
 
 impl PatchImager {
@@ -153,31 +190,60 @@ impl PatchImager {
         let reach = CONES * cone + fringes * params.wavelength_um / params.na;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a distance in pixels")]
         let pixels = (reach / params.pixel_um).ceil() as usize;
-        // Rounds up to 2ⁿ or 3 · 2ⁿ.
-        let twos = pixels.next_power_of_two();
-        Ok(if 4 * pixels <= 3 * twos { 3 * twos / 4 } else { twos })
+        // Rounds up to 4, 5, 6 or 7 times 2ⁿ, so that similar depths share spectra.
+        let step = (pixels.next_power_of_two() / 8).max(1);
+        Ok(pixels.next_multiple_of(step))
     }
 
-    /// Loads a rectangle of the slide into `patch`: transmittances, 0 to 1, and phase delays in radians. An empty
-    /// `phase_rad` means no phase delay.
+    /// Loads an object with several samples per pixel into `patch`: transmittances, 0 to 1, and phase delays in
+    /// radians. An empty `phase_rad` means no phase delay.
     ///
     /// # Panics
     ///
     /// If a size is 0 or not a multiple of the oversampling, or the slices differ in length.
     pub fn load(&self, transmittance: &[f32], phase_rad: &[f32], width: usize, patch: &mut Patch) {
-        let oversampling = self.microscope().params().oversampling;
-        let fits = |side: usize| side > 0 && side.is_multiple_of(oversampling);
-        let whole = fits(width) && transmittance.len().is_multiple_of(width) && fits(transmittance.len() / width);
-        assert!(whole, "the patch size must be a multiple of the oversampling");
-        let same = phase_rad.is_empty() || phase_rad.len() == transmittance.len();
-        assert!(same, "transmittance and phase must have the same length");
-        patch.width = width;
-        patch.transmittance.clear();
-        patch.transmittance.extend_from_slice(transmittance);
-        patch.phase_rad.clear();
-        patch.phase_rad.extend_from_slice(phase_rad);
+        let samples_per_pixel = self.microscope().params().oversampling;
+        let layer = PatchLayer { transmittance, phase_rad, width, samples_per_pixel, ..PatchLayer::default() };
+        let size = [width, transmittance.len().checked_div(width).unwrap_or(0)];
+        self.load_layers(size.map(|side| side / samples_per_pixel), &[layer], patch);
+    }
+
+    /// Loads an object in several layers into `patch`, which has `size_px` pixels. Layers after the first have no phase
+    /// delay.
+    ///
+    /// # Panics
+    ///
+    /// If a layer is empty, not within the patch, or has incomplete pixels, or its slices differ in length.
+    pub fn load_layers(&self, size_px: [usize; 2], layers: &[PatchLayer<'_>], patch: &mut Patch) {
+        patch.size_px = size_px;
         patch.plans = Some(Arc::clone(&self.plans));
-        patch.fresh = 0;
+        patch.layers.resize_with(layers.len(), LoadedLayer::default);
+        for (layer, loaded) in layers.iter().zip(&mut patch.layers) {
+            let PatchLayer { transmittance, behind, phase_rad, width, samples_per_pixel: n, at_px } = *layer;
+            let fits = |side: usize| n > 0 && side > 0 && side.is_multiple_of(n);
+            let is_whole =
+                fits(width) && transmittance.len().is_multiple_of(width) && fits(transmittance.len() / width);
+            assert!(is_whole, "the size of a layer must be a multiple of the oversampling");
+            let size = [width / n, transmittance.len() / width / n];
+            let is_within = (0..2).all(|axis| at_px[axis] + size[axis] <= size_px[axis]);
+            assert!(is_within, "a layer must be within the patch");
+            let fits = |other: &[f32]| other.is_empty() || other.len() == transmittance.len();
+            assert!(fits(phase_rad) && fits(behind), "transmittance and phase must have the same length");
+            let copy = |to: &mut Vec<f32>, from: &[f32]| {
+                to.clear();
+                to.extend_from_slice(from);
+            };
+            copy(&mut loaded.behind, behind);
+            copy(&mut loaded.phase, if is_nonzero(phase_rad) { phase_rad } else { &[] });
+            loaded.absorbed.clear();
+            if behind.is_empty() {
+                loaded.absorbed.extend(transmittance.iter().map(|t| 1.0 - t));
+            } else {
+                loaded.absorbed.extend(transmittance.iter().zip(behind).map(|(t, behind)| behind - t));
+            }
+            loaded.is_empty = loaded.phase.is_empty() && !is_nonzero(&loaded.absorbed);
+            (loaded.width, loaded.samples_per_pixel, loaded.at_px, loaded.fresh) = (width, n, at_px, 0);
+        }
     }
 
     /// Computes the transmission factor of a patch, including the margin of `focus`.
@@ -186,87 +252,92 @@ impl PatchImager {
     ///
     /// If nothing was loaded, or the patch or the focus belong to another imager.
     pub fn expose(&self, patch: &mut Patch, focus: &Focus, scratch: &mut PatchScratch, factor: &mut Factor) {
-        let own = |plans: &Arc<LanePlans>| Arc::ptr_eq(plans, &self.plans);
-        assert!(
-            patch.plans.as_ref().is_some_and(own) && own(&focus.plans),
-            "the patch or the focus belongs to another imager"
-        );
-        let (filter, scratch) = (&*focus.filter, &mut scratch.0);
-        let oversampling = self.microscope().params().oversampling;
-        let [width, height] = [patch.width, patch.transmittance.len() / patch.width];
-        let PaddedSpectra { canvas, spectra, .. } = self.padded_spectra(patch, focus, scratch);
-        let (scale, stride) = match filter.lattice {
-            Lattice::Object => (oversampling, 1),
-            Lattice::Camera => (1, oversampling),
-        };
-        let outer = |side: usize| side / stride + 2 * focus.margin_px * scale;
-        *factor = Factor {
-            lattice: filter.lattice,
-            width: outer(width),
-            values: core::mem::take(&mut factor.values),
-            margin_px: focus.margin_px,
-            clipped: 0,
-        };
-        factor.values.resize(outer(width) * outer(height), 1.0);
-        if spectra.absorbed.is_empty() {
-            factor.values.fill(1.0);
-        } else {
-            factor.clipped = canvas.transmit::<true>(filter, spectra, &mut factor.values, factor.width, scratch);
-        }
-        if !spectra.phase.is_empty() {
-            let part = core::iter::once((filter, &*spectra));
-            canvas.refract(filter.lattice, part, &mut factor.values, factor.width, scratch);
-        }
+        self.expose_with(patch, |_| focus, scratch, factor);
     }
 
-    /// Returns the patch's spectra with the margin of a focus, and computes missing ones.
+    /// As [`expose`](Self::expose), with a focus for each layer. All must have the margin of the first.
+    ///
+    /// # Panics
+    ///
+    /// If nothing was loaded, or the patch or a focus belong to another imager, or margins differ.
+    pub fn expose_with<'a>(
+        &self,
+        patch: &mut Patch,
+        focus_of: impl Fn(usize) -> &'a Focus,
+        scratch: &mut PatchScratch,
+        factor: &mut Factor,
+    ) {
+        let own = |plans: &Arc<LanePlans>| Arc::ptr_eq(plans, &self.plans);
+        let is_own = patch.plans.as_ref().is_some_and(own) && (0..patch.layers.len()).all(|i| own(&focus_of(i).plans));
+        assert!(is_own, "the patch or the focus belongs to another imager");
+        let margin_px = focus_of(0).margin_px;
+        let [width, height] = patch.size_px.map(|side| side + 2 * margin_px);
+        let PatchScratch { canvas: scratch, phases } = scratch;
+        *factor = Factor { width, values: core::mem::take(&mut factor.values), margin_px, clipped: 0 };
+        factor.values.clear();
+        factor.values.resize(width * height, 0.0);
+        phases.clear();
+        if patch.layers.iter().any(|layer| !layer.phase.is_empty()) {
+            phases.resize(width * height, 0.0);
+        }
+        for (index, layer) in patch.layers.iter_mut().enumerate().filter(|(_, layer)| !layer.is_empty) {
+            let focus = focus_of(index);
+            assert!(focus.margin_px == margin_px, "layers must have the same margin");
+            let [x, y] = layer.at_px;
+            let columns = layer.width / layer.samples_per_pixel + 2 * margin_px;
+            let rows = layer.absorbed.len() / layer.width / layer.samples_per_pixel + 2 * margin_px;
+            let has_phase = !layer.phase.is_empty();
+            let PaddedSpectra { canvas, spectra, .. } = self.padded_spectra(layer, focus, scratch);
+            let absorbed = &mut factor.values[y * width..(y + rows) * width];
+            let phases = if has_phase { &mut phases[y * width..(y + rows) * width] } else { &mut [] };
+            canvas.expose(
+                &focus.filter,
+                spectra,
+                columns,
+                |stripe| stripe.add_to(absorbed, phases, width, x, x + columns),
+                scratch,
+            );
+        }
+        factor.clipped = transmit(&mut factor.values, phases);
+    }
+
+    /// Returns the layer's spectra with the margin of a focus, and computes missing ones.
     fn padded_spectra<'a>(
         &self,
-        patch: &'a mut Patch,
+        layer: &'a mut LoadedLayer,
         focus: &Focus,
-        scratch: &mut LaneScratch,
+        scratch: &mut CanvasScratch,
     ) -> &'a mut PaddedSpectra {
-        let Patch { width, transmittance, phase_rad, padded, fresh, .. } = patch;
-        let width = *width;
-        let height = transmittance.len() / width;
-        let offset = focus.margin_px * self.microscope().params().oversampling;
-        let absorbing = Samples { samples: transmittance, width, offset, background: 1.0 };
-        let phase = Samples { samples: phase_rad, width, offset, background: 0.0 };
+        let LoadedLayer { absorbed, behind, phase, width, samples_per_pixel, padded, fresh, .. } = layer;
+        let (width, n) = (*width, *samples_per_pixel);
+        let samples = Samples { absorbed, behind, phase, width, offset: focus.margin_px * n };
         let cached = padded[..*fresh].iter().position(|entry| entry.margin_px == focus.margin_px);
         let index = cached.unwrap_or_else(|| {
-            let canvas = self.canvas([width, height], focus.margin_px);
+            let canvas = self.canvas([width / n, absorbed.len() / width / n], n, focus.margin_px);
             if padded.len() == *fresh {
                 padded.push(PaddedSpectra { margin_px: 0, canvas: Arc::clone(&canvas), spectra: Spectra::default() });
             }
             let entry = &mut padded[*fresh];
             entry.margin_px = focus.margin_px;
             entry.canvas = canvas;
-            entry.spectra.clear();
             *fresh += 1;
-            entry.canvas.transform(absorbing, absorbed_of, &mut entry.spectra.absorbed, scratch);
-            if !phase_rad.is_empty() {
-                entry.canvas.transform(phase, is_nonzero, &mut entry.spectra.phase, scratch);
-            }
+            entry.canvas.load(samples, &mut entry.spectra, scratch);
             *fresh - 1
         });
         let entry = &mut padded[index];
         if focus.filter.is_corrected {
-            if entry.spectra.amplitude.is_empty() {
-                entry.canvas.transform(absorbing, amplitude_of(absorbed_of), &mut entry.spectra.amplitude, scratch);
-            }
-            entry.canvas.correct(&self.in_focus, &mut entry.spectra, scratch);
+            entry.canvas.correct(&self.in_focus, samples, &mut entry.spectra, scratch);
         }
         entry
     }
 
-    /// Returns the canvas for a patch size with its margin.
-    fn canvas(&self, size: [usize; 2], margin_px: usize) -> Arc<Canvas> {
-        let oversampling = self.microscope().params().oversampling;
-        let size = size.map(|side| oversampling * fast_length(side / oversampling + 2 * margin_px));
+    /// Returns the canvas for a size in pixels with its margin.
+    fn canvas(&self, size_px: [usize; 2], samples_per_pixel: usize, margin_px: usize) -> Arc<Canvas> {
+        let size_px = size_px.map(|side| fast_length(side + 2 * margin_px));
         // The map stays valid if a thread panics.
         let mut canvases = self.canvases.lock().unwrap_or_else(PoisonError::into_inner);
-        let make = || Arc::new(Canvas::new(self.microscope(), size, &self.plans));
-        Arc::clone(canvases.entry(size).or_insert_with(make))
+        let make = || Arc::new(Canvas::new(self.microscope(), size_px, samples_per_pixel, &self.plans));
+        Arc::clone(canvases.entry((size_px, samples_per_pixel)).or_insert_with(make))
     }
 }
 

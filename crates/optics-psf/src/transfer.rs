@@ -138,18 +138,6 @@ impl Transfer {
         }
         mixed
     }
-
-    /// Returns the frequency in cycles/µm beyond which neither H_A nor H_P exceeds `size`.
-    pub(crate) fn extent(&self, size: f64) -> f64 {
-        let large = |pair: &[f64; 2]| pair[0] * pair[0] + pair[1] * pair[1] > size * size;
-        let last = if self.is_round() {
-            self.table.iter().rposition(|[a, p]| large(&[a[0], p[0]]))
-        } else {
-            let rows = self.table.chunks_exact(ASYMMETRIC_SAMPLES);
-            rows.filter_map(|row| row.iter().rposition(|pairs| pairs.iter().any(large))).max()
-        };
-        last.map_or(0.0, |i| self.step * (i + 1) as f64)
-    }
 }
 
 /// Polynomial nodes of a section of a profile: a minimum, and the number per fringe.

@@ -177,14 +177,8 @@ fn pack_rows(spectrum: &[Vec<Lanes>], columns: usize, first: usize, line: &mut [
     let width = line.len();
     line.fill(ZERO);
     for (kx, block) in (0..).step_by(LANES).zip(spectrum) {
-        let mut parts = [[[0.0; LANES]; LANES]; 4];
-        let (a, b) = block[first..first + ROWS].split_at(LANES);
-        for l in 0..LANES {
-            [parts[0][l], parts[1][l]] = a[l];
-            [parts[2][l], parts[3][l]] = b[l];
-        }
-        let [a_re, a_im] = [transposed(&parts[0]), transposed(&parts[1])];
-        let [b_re, b_im] = [transposed(&parts[2]), transposed(&parts[3])];
+        let part = |first: usize, part: usize| transposed(core::array::from_fn(|l| &block[first + l][part]));
+        let [a_re, a_im, b_re, b_im] = [part(first, 0), part(first, 1), part(first + LANES, 0), part(first + LANES, 1)];
         for i in 0..LANES.min(columns - kx) {
             let (mut z, mut mirrored) = (ZERO, ZERO);
             for l in 0..LANES {
@@ -207,11 +201,7 @@ fn write_rows(line: &[Lanes], rows: &mut [f32], width: usize) {
     let mut last = [ZERO; LANES];
     last[..rest.len()].copy_from_slice(rest);
     for (left, values) in (0..width).step_by(LANES).zip(whole.iter().chain([&last])) {
-        let mut parts = [[[0.0; LANES]; LANES]; 2];
-        for i in 0..LANES {
-            [parts[0][i], parts[1][i]] = values[i];
-        }
-        let parts = [transposed(&parts[0]), transposed(&parts[1])];
+        let parts = [0, 1].map(|part| transposed(core::array::from_fn(|l| &values[l][part])));
         let rows = rows.chunks_exact_mut(width).zip(parts.as_flattened());
         if left + LANES <= width {
             rows.for_each(|(row, part)| row[left..left + LANES].copy_from_slice(part));

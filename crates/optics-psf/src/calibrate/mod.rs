@@ -13,7 +13,7 @@ pub use edge::{EdgeFit, edge};
 
 use crate::error::require;
 use crate::grid::fast_length;
-use crate::lane_plane::{LANES, LanePlane, LanePlans, LaneScratch, LaneSupport, Lanes};
+use crate::spectrum::{Grid, GridScratch, LANES, LanePlans, Lanes, Pixels, Spectrum, Support};
 use crate::{Border, Error, Gaussian, Microscope, MicroscopeParams, Scratch};
 
 /// Smallest width and height of a window, in pixels.
@@ -257,9 +257,9 @@ pub fn condenser(
 
     // Mirrored, so that the periodic grid has no step at its seam.
     let [wide, high] = [outer.width, outer.height].map(|side| fast_length(2 * side));
-    let plane = LanePlane::new(wide, high, &LanePlans::default());
-    let support = LaneSupport::new(wide, high, 1.0);
-    let (mut scratch, mut spectrum) = (LaneScratch::default(), Vec::new());
+    let plane = Grid::new([wide, high], &LanePlans::default());
+    let support = Support::new([wide, high], 1.0);
+    let (mut scratch, mut spectrum) = (GridScratch::default(), Spectrum::default());
     let reflected = |i: usize, len: usize| Border::Reflect.source(i.cast_signed(), len).unwrap_or(0);
     let fill = |left: usize, stripe: &mut [Lanes]| {
         for (y, row) in stripe.iter_mut().enumerate() {
@@ -270,9 +270,9 @@ pub fn condenser(
         }
         true
     };
-    plane.forward(&support, fill, &mut spectrum, &mut scratch);
+    plane.forward(&support, Pixels::Real, fill, &mut spectrum, &mut scratch);
     let frequencies: Vec<[[f64; 2]; LANES]> =
-        support.frequencies(wide, high).map(|f| f.map(|f| f.map(|f| f / microscope.pixel_um))).collect();
+        support.frequencies([wide, high]).map(|f| f.map(|f| f.map(|f| f / microscope.pixel_um))).collect();
 
     let mut tried = Vec::new();
     for i in 0..TRIED {
@@ -282,7 +282,7 @@ pub fn condenser(
         let mut sum = 0.0;
         for k in (0..stack.len()).filter(|k| k != focused) {
             let transfer = candidate.transfer(0.0, step_um * (k as f64 - *focused as f64))?;
-            let mut filtered = spectrum.clone();
+            let mut filtered = spectrum.plus.clone();
             for (value, frequencies) in filtered.iter_mut().zip(&frequencies) {
                 for (l, &f) in frequencies.iter().enumerate() {
                     let ([now, _], [then, _]) = (transfer.absorption(f), rest.absorption(f));

@@ -301,12 +301,12 @@ fn camera_lattice_error_is_below_a_thousandth() {
 #[test]
 fn pixels_are_means_over_samples() {
     let (Some(disk), Some(asym)) = (array("ref_disk_absorbance"), array("ref_asym_absorbance")) else { return };
-    let fine = image(&field(&sampled(0.4), &[0.0, 1.2], &[0.0]), &[&asym, &disk]);
-    let coarse = image(
-        &field(&MicroscopeParams { pixel_um: 0.25, oversampling: 2, ..sampled(0.4) }, &[0.0, 1.2], &[0.0]),
-        &[&asym, &disk],
-    );
-    assert!(relative(&coarse, &pixels(&fine)) < 1e-5);
+    for (depth, object) in [(0.0, &asym), (1.2, &disk), (3.0, &asym)] {
+        let fine = image(&field(&sampled(0.4), &[depth], &[0.0]), &[object]);
+        let in_pixels = MicroscopeParams { pixel_um: 0.25, oversampling: 2, ..sampled(0.4) };
+        let coarse = image(&field(&in_pixels, &[depth], &[0.0]), &[object]);
+        assert!(relative(&coarse, &pixels(&fine)) < 1e-5, "{depth}");
+    }
 }
 
 #[test]

@@ -4,8 +4,8 @@
 
 use crate::support::{SIDE, absorbing, array, double, relative, shifted, single, soft_disk, worst};
 use optics_psf::{
-    Abbe, AbbeParams, BrightField, BrightFieldParams, Error, Factor, Focus, Lattice, Layer, MIN_TRANSMITTANCE,
-    Microscope, MicroscopeParams, Padding, Patch, PatchImager, PatchScratch, Source, TransmittedLight, Zernike,
+    Abbe, AbbeParams, BrightField, BrightFieldParams, Error, Factor, Focus, Layer, MIN_TRANSMITTANCE, Microscope,
+    MicroscopeParams, Padding, Patch, PatchImager, PatchLayer, PatchScratch, Source, TransmittedLight, Zernike,
 };
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -211,7 +211,7 @@ fn light_beyond_margins_is_below_a_thousandth_of_the_contrast() {
                     padded[(k / width + more) * wide + k % width + more] = *t;
                 }
                 let all = factor(&imager, &Object { transmittance: padded, width: wide, ..object }, &focus);
-                let offset = more / if found.lattice == Lattice::Object { 1 } else { 2 };
+                let offset = more / 2;
                 let height = found.values.len() / found.width;
                 let inside = |v: usize, len: usize| (offset..offset + len).contains(&v);
                 let contrast = all.values.iter().map(|v| 1.0 - v).fold(0.0, f32::max);
@@ -246,14 +246,63 @@ fn factors_do_not_depend_on_earlier_exposures() {
         for focus in &focuses {
             imager.expose(&mut patch, focus, &mut scratch, &mut out);
             assert_eq!(out, factor(&imager, object, focus));
-            let inner = object.width / if out.lattice == Lattice::Object { 1 } else { 2 };
-            let margin = focus.margin_px() * if out.lattice == Lattice::Object { 2 } else { 1 };
-            assert_eq!(
-                (out.width, out.values.len()),
-                (inner + 2 * margin, (inner + 2 * margin) * (inner + 2 * margin))
-            );
+            let side = object.width / 2 + 2 * focus.margin_px();
+            assert_eq!((out.width, out.values.len()), (side, side * side));
         }
     }
+}
+
+#[test]
+fn layers_of_an_object_match_one_layer() {
+    // A smooth disc with a small sharp one in it: 1 sample per pixel for the first, 2 for the second.
+    let imager = imager(&MicroscopeParams { condenser_na: 0.6, ..MicroscopeParams::default() });
+    let smooth = |x: f64, y: f64| 0.15 / (1.0 + libm::exp((libm::hypot(x - 64.0, y - 64.0) - 40.0) / 5.0));
+    let small = |x: f64, y: f64| 0.4 * (9.0 - libm::hypot(x - 70.0, y - 58.0)).clamp(0.0, 1.0);
+    let image = |width: usize, at: [f64; 2], absorbance: &dyn Fn(f64, f64) -> f64| -> Vec<f32> {
+        let sample = |i: usize| absorbance(at[0] + (i % width) as f64, at[1] + (i / width) as f64);
+        (0..width * width).map(|i| libm::exp10(-sample(i)) as f32).collect()
+    };
+    let fine = image(128, [0.0, 0.0], &|x, y| smooth(x, y) + small(x, y));
+    // Samples are at the centres of pixels, and the second layer begins at pixel (28, 22).
+    let coarse = image(64, [0.0, 0.0], &|x, y| smooth(2.0 * x + 0.5, 2.0 * y + 0.5));
+    let behind = image(32, [56.0, 44.0], &smooth);
+    let both = image(32, [56.0, 44.0], &|x, y| smooth(x, y) + small(x, y));
+    let layers = [
+        PatchLayer { transmittance: &coarse, width: 64, samples_per_pixel: 1, ..PatchLayer::default() },
+        PatchLayer {
+            transmittance: &both,
+            behind: &behind,
+            width: 32,
+            samples_per_pixel: 2,
+            at_px: [28, 22],
+            ..PatchLayer::default()
+        },
+    ];
+    let (mut patch, mut scratch) = (Patch::default(), PatchScratch::default());
+    let (mut whole, mut layered) = (Factor::default(), Factor::default());
+    for depth in [0.0, 0.7, -1.6, 3.0, 8.0] {
+        let focus = imager.focus(depth, 0.0).unwrap();
+        imager.load(&fine, &[], 128, &mut patch);
+        imager.expose(&mut patch, &focus, &mut scratch, &mut whole);
+        imager.load_layers([64, 64], &layers, &mut patch);
+        imager.expose(&mut patch, &focus, &mut scratch, &mut layered);
+        assert_eq!(layered.width, whole.width);
+        let error = relative(&double(&layered.values), &double(&whole.values));
+        assert!(error < 2e-3, "{depth}: {error}");
+    }
+}
+
+#[test]
+#[should_panic(expected = "within the patch")]
+fn layers_outside_the_patch_panic() {
+    let layer = PatchLayer {
+        transmittance: &[1.0; 16],
+        width: 4,
+        samples_per_pixel: 2,
+        at_px: [1, 0],
+        ..PatchLayer::default()
+    };
+    imager(&MicroscopeParams::default()).load_layers([2, 2], &[layer], &mut Patch::default());
 }
 
 #[test]
@@ -391,16 +440,15 @@ fn stray_light_brightens_dark_regions() {
 }
 
 #[test]
-fn margins_and_lattices_depend_on_defocus_only() {
+fn margins_depend_on_defocus_only() {
     let imager = imager(&MicroscopeParams::default());
     let focus = |depth, stage| imager.focus(depth, stage).unwrap();
     let mut margins: Vec<usize> = (0..40).map(|z| focus(0.5 * f64::from(z), 0.0).margin_px()).collect();
     assert!(margins.windows(2).all(|pair| pair[0] <= pair[1]));
     margins.dedup();
-    assert!(margins[0] == 12 && margins.len() <= 6, "{margins:?}");
+    assert!(margins[0] == 10 && margins.len() <= 10, "{margins:?}");
     assert_eq!(focus(2.0, 0.0).margin_px(), focus(-2.0, 0.0).margin_px());
     assert!((focus(-1.0, -1.0).defocus_um() - (1.0 - 1.515)).abs() < 1e-12);
-    assert_eq!((focus(0.0, 0.0).lattice(), focus(6.0, 0.0).lattice()), (Lattice::Object, Lattice::Camera));
 }
 
 #[test]

@@ -63,7 +63,7 @@ pub(crate) fn add_coat(coat: &Coat, context: &ObjectContext<'_>, phantom: &mut P
     let (noise_fields, pixel_um) = (context.noise_fields, context.pixel_um);
     let mut rng = context.stream("coat.shape");
     let margin = (coat.overhang_um + RIM_UM) / pixel_um + 2.0;
-    let whole = cell.coverage.clone().repeated(cell.coverage_step);
+    let whole = cell.coverage.clone().repeated(cell.step);
     let corner = whole.origin.map(|at| at as f64);
     let opposite = [corner[0] + (whole.width - 1) as f64, corner[1] + (whole.height() - 1) as f64];
     let mut canvas = ObjectCanvas::around(&[corner, opposite], margin);

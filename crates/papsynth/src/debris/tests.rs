@@ -259,7 +259,8 @@ fn reach_um(scene: &Scene, object: &Object, phantom: &Phantom) -> f64 {
     let n = scene.oversampling();
     let mut farthest = 0.0_f64;
     for piece in &phantom.pieces {
-        for (tile, step) in [(&piece.absorbance, n), (&piece.coverage, n / piece.coverage_step)] {
+        let step = n / piece.step;
+        for tile in [&piece.absorbance, &piece.coverage] {
             let grid = crate::scene::View { pixel_um: scene.view.pixel_um / step as f64, ..scene.view };
             let centre = grid.to_px(object.centre_um);
             let mut index = 0;

@@ -87,7 +87,8 @@ impl Phantom {
         let reach_px = object.body.reach_um(view.pixel_um) / view.pixel_um + 2.0;
         let grid = |step: usize| View { pixel_um: view.pixel_um / step as f64, ..view };
         for piece in &mut self.pieces {
-            for (tile, step) in [(&mut piece.absorbance, n), (&mut piece.coverage, n / piece.coverage_step)] {
+            let step = n / piece.step;
+            for tile in [&mut piece.absorbance, &mut piece.coverage] {
                 let centre = grid(step).to_px(object.centre_um);
                 *tile = core::mem::take(tile).cropped(centre, reach_px * step as f64);
                 for axis in 0..2 {

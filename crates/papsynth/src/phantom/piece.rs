@@ -14,11 +14,12 @@ pub(crate) const MIN_ABSORBANCE: f64 = 1e-6;
 #[derive(Debug, Clone)]
 pub(crate) struct Piece {
     pub(crate) part: Part,
-    /// In-focus decadic absorbance along the light path.
+    /// Distance of the samples of both tiles, in grid points. The origins of the tiles are in samples, too.
+    pub(crate) step: usize,
+    /// In-focus decadic absorbance along the light path, at the centres of samples.
     pub(crate) absorbance: Tile,
-    /// Fraction that the in-focus outline covers of each square of `coverage_step` x `coverage_step` grid points.
+    /// Fraction of each sample that the in-focus outline covers.
     pub(crate) coverage: Tile,
-    pub(crate) coverage_step: usize,
     /// Area within the outline, including the part outside the image, px².
     pub(crate) area_px: f64,
     /// Whether the absorbance comes from a microscope image, which is already blurred.
@@ -38,9 +39,9 @@ impl Piece {
     pub(super) fn whole(absorbance: Tile, coverage: Tile, area_px: f64, dyes: Amounts) -> Self {
         Self {
             part: Part::Whole,
+            step: 1,
             absorbance,
             coverage,
-            coverage_step: 1,
             area_px,
             imaged: false,
             dyes,
@@ -52,11 +53,17 @@ impl Piece {
 
     /// Returns the fraction of each camera pixel that the outline covers, for `n` grid points per pixel and axis.
     pub(crate) fn pixel_coverage(&self, n: usize) -> Cow<'_, Tile> {
-        match n / self.coverage_step {
-            1 => Cow::Borrowed(&self.coverage),
-            factor => Cow::Owned(self.coverage.coarsened(factor)),
-        }
+        coarsened(&self.coverage, n / self.step)
     }
+
+    /// Returns the mean absorbance of each camera pixel, for `n` grid points per pixel and axis.
+    pub(crate) fn pixel_absorbance(&self, n: usize) -> Cow<'_, Tile> {
+        coarsened(&self.absorbance, n / self.step)
+    }
+}
+
+fn coarsened(tile: &Tile, factor: usize) -> Cow<'_, Tile> {
+    if factor == 1 { Cow::Borrowed(tile) } else { Cow::Owned(tile.coarsened(factor)) }
 }
 
 /// The in-focus absorbance of an object.

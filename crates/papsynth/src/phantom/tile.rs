@@ -93,28 +93,22 @@ impl Tile {
         sum_where(&self.values, &self.values, f32::NEG_INFINITY)
     }
 
-    /// Returns the sum of its values where `other` is at least `min`. Pixels of `other` are `step` times as large.
-    pub(crate) fn sum_where(&self, other: &Self, step: usize, min: f32) -> f64 {
-        let start = other.origin.map(|at| at * step as i64);
-        let (columns, others) = intersection(self.origin[0], self.width, start[0], other.width * step);
-        let (rows, other_rows) = intersection(self.origin[1], self.height(), start[1], other.height() * step);
-        if columns.is_empty() {
-            return 0.0;
-        }
-        // Pixel range of the other tile.
-        let coarse = others.start / step..others.end.div_ceil(step);
-        let mut line = vec![0.0; coarse.len() * step];
-        let mut current_row = None;
-        let mut sum = 0.0;
-        for (y, other_y) in rows.zip(other_rows) {
-            let row = other_y / step;
-            if current_row.replace(row) != Some(row) {
-                repeat_each(&mut line, &other.values[row * other.width..][coarse.clone()], step);
-            }
-            let values = &self.values[y * self.width..][columns.clone()];
-            sum += sum_where(values, &line[others.start - coarse.start * step..], min);
-        }
-        sum
+    /// Returns the sum of its values where `other` is at least `min`.
+    pub(crate) fn sum_where(&self, other: &Self, min: f32) -> f64 {
+        let (columns, others) = intersection(self.origin[0], self.width, other.origin[0], other.width);
+        let (rows, other_rows) = intersection(self.origin[1], self.height(), other.origin[1], other.height());
+        let values = |y: usize| &self.values[y * self.width..][columns.clone()];
+        let masks = |y: usize| &other.values[y * other.width..][others.clone()];
+        rows.zip(other_rows).map(|(y, other_y)| sum_where(values(y), masks(other_y), min)).sum()
+    }
+
+    /// Returns the part of the tile within a rectangle of pixels.
+    pub(crate) fn part(&self, low: [i64; 2], width: usize, height: usize) -> Self {
+        let (columns, _) = intersection(self.origin[0], self.width, low[0], width);
+        let (rows, _) = intersection(self.origin[1], self.height(), low[1], height);
+        let origin = [self.origin[0] + columns.start as i64, self.origin[1] + rows.start as i64];
+        let values = rows.flat_map(|y| self.values[y * self.width..][columns.clone()].iter().copied()).collect();
+        Self { origin, width: columns.len(), values }
     }
 
     /// Returns the tile on a grid `n` times as fine, with each pixel repeated.
@@ -161,6 +155,31 @@ impl Tile {
             }
         }
         Self { origin: self.origin.map(|at| at * N as i64), width: width * N, values }
+    }
+
+    /// Returns the mean and the standard deviation of the `n` x `n` values that [`Tile::refined`] computes in each
+    /// pixel. The deviation is that of a linear slope.
+    pub(crate) fn moments_within_pixels(&self, n: usize) -> [Self; 2] {
+        let kernels = (0..n).map(|k| CubicWeights::new((k as f64 + 0.5) / n as f64 - 0.5).padded());
+        let mut weights = [0.0; 2 * RADIUS + 1];
+        for kernel in kernels {
+            weights.iter_mut().zip(kernel).for_each(|(sum, weight)| *sum += weight / n as f32);
+        }
+        // Of n equidistant points in a pixel.
+        let variance = (1.0 - 1.0 / (n * n) as f64) / 12.0;
+        let (width, zeros) = (self.width, vec![0.0; self.width]);
+        let row = |y: usize| y.checked_sub(RADIUS).and_then(|y| self.values.get(y * width..(y + 1) * width));
+        let [mut mean, mut deviation] = [self.blank(), self.blank()];
+        // Rows with margins for the interpolation.
+        let (mut line, mut centre) = (vec![0.0; width + 2 * RADIUS], vec![0.0; width + 2 * RADIUS]);
+        let outs = mean.values.chunks_exact_mut(width).zip(deviation.values.chunks_exact_mut(width));
+        for (y, (mean, deviation)) in outs.enumerate() {
+            let rows = core::array::from_fn(|k| row(y + k).unwrap_or(&zeros));
+            centre[RADIUS..RADIUS + width].copy_from_slice(rows[RADIUS]);
+            mix_five(&mut line[RADIUS..RADIUS + width], rows, weights);
+            moments(mean, deviation, &line, &centre, [rows[RADIUS - 1], rows[RADIUS + 1]], (weights, variance as f32));
+        }
+        [mean, deviation]
     }
 
     pub(crate) fn height(&self) -> usize {
@@ -240,6 +259,41 @@ impl CubicWeights {
         ];
         Self { first: if offset < 0.0 { 0 } else { 1 }, weights: cubic.map(|weight| weight as f32) }
     }
+
+    /// Returns the weights of all neighbours up to [`RADIUS`]. Weights of 0 give all positions the same inputs, which
+    /// allows vectorisation.
+    fn padded(&self) -> [f32; 2 * RADIUS + 1] {
+        let mut padded = [0.0; 2 * RADIUS + 1];
+        padded[self.first..self.first + 4].copy_from_slice(&self.weights);
+        padded
+    }
+}
+
+#[multiversion(targets = "simd")]
+fn mix_five(out: &mut [f32], [a, b, c, d, e]: [&[f32]; 5], w: [f32; 5]) {
+    for (((((out, a), b), c), d), e) in out.iter_mut().zip(a).zip(b).zip(c).zip(d).zip(e) {
+        *out = w[0] * a + w[1] * b + w[2] * c + w[3] * d + w[4] * e;
+    }
+}
+
+/// Mixes a row along x to its mean within pixels, and computes the deviation from the slopes of the rows around it.
+#[multiversion(targets = "simd")]
+fn moments(
+    mean: &mut [f32],
+    deviation: &mut [f32],
+    line: &[f32],
+    centre: &[f32],
+    [above, below]: [&[f32]; 2],
+    (w, variance): ([f32; 5], f32),
+) {
+    let out = mean.iter_mut().zip(deviation).zip(line.windows(5)).zip(centre.windows(5)).zip(above).zip(below);
+    for (((((mean, deviation), near), centre), above), below) in out {
+        let value = w[0] * near[0] + w[1] * near[1] + w[2] * near[2] + w[3] * near[3] + w[4] * near[4];
+        *mean = if value > 0.0 { value } else { 0.0 };
+        let slope = [0.5 * (centre[3] - centre[1]), 0.5 * (below - above)];
+        let size = (variance * (slope[0] * slope[0] + slope[1] * slope[1])).sqrt();
+        *deviation = if size < *mean { size } else { *mean };
+    }
 }
 
 #[multiversion(targets = "simd")]
@@ -252,11 +306,7 @@ fn mix(out: &mut [f32], [a, b, c, d]: [&[f32]; 4], weights: [f32; 4]) {
 /// Interpolates a row with margins of [`RADIUS`] to a grid `N` times as fine.
 #[multiversion(targets = "simd")]
 fn refine_row<const N: usize>(out: &mut [f32], line: &[f32], kernels: &[CubicWeights; N]) {
-    // Padding with a weight of 0 gives all positions the same inputs, which allows vectorisation.
-    let mut weights = [[0.0; 2 * RADIUS + 1]; N];
-    for (weights, CubicWeights { first, weights: four }) in weights.iter_mut().zip(kernels) {
-        weights[*first..first + 4].copy_from_slice(four);
-    }
+    let weights: [_; N] = core::array::from_fn(|k| kernels[k].padded());
     for (out, near) in out.as_chunks_mut::<N>().0.iter_mut().zip(line.windows(2 * RADIUS + 1)) {
         for (out, w) in out.iter_mut().zip(&weights) {
             let value = w[0] * near[0] + w[1] * near[1] + w[2] * near[2] + w[3] * near[3] + w[4] * near[4];
@@ -496,6 +546,26 @@ pub(super) mod tests {
             blob.cover(&disc([1.2, 7.6], 2.7));
             let (sum, area) = (blob.sum(), blob.refined(n).sum() / (n * n) as f64);
             assert!((area / sum - 1.0).abs() < 0.02, "{n}: {area} {sum}");
+        }
+    }
+
+    #[test]
+    fn moments_within_pixels_match_the_refined_tile() {
+        for n in 2..=4 {
+            let mut tile = Tile { origin: [-4, 3], width: 40, values: vec![0.0; 40 * 30] };
+            tile.cover(&disc([14.0, 17.0], 9.0));
+            for (i, value) in tile.values.iter_mut().enumerate() {
+                *value *= 1.0 + 0.2 * ((i % 40) as f32 * 0.9).sin() + 0.3 * ((i / 40) as f32 * 0.4).cos();
+            }
+            let [mean, deviation] = tile.moments_within_pixels(n);
+            let fine = tile.clone().refined(n);
+            let squares = Tile { values: fine.values.iter().map(|v| v * v).collect(), ..fine.clone() }.coarsened(n);
+            for (i, expected) in fine.coarsened(n).values.iter().enumerate() {
+                let spread = (squares.values[i] - expected * expected).max(0.0).sqrt();
+                // Undershoots at the rim are clipped after the mean here, before it there.
+                assert!((mean.values[i] - expected).abs() < 0.02, "{n} {i}: {} {expected}", mean.values[i]);
+                assert!((deviation.values[i] - spread).abs() < 0.06, "{n} {i}: {} {spread}", deviation.values[i]);
+            }
         }
     }
 

@@ -7,14 +7,14 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use multiversion::multiversion;
 use optics_psf::{
-    Abbe, AbbeParams, Border, Factor, Focus, Gaussian, Lattice, Layer, Method, Microscope, Patch, PatchScratch, Source,
-    fast_length,
+    Abbe, AbbeParams, Border, Factor, Focus, Gaussian, Layer, Method, Microscope, Patch, PatchLayer, PatchScratch,
+    Source, fast_length,
 };
 use portable_numerics::elementary::exp10_from;
 
 use super::channel_lights::{ChannelLight, LightGroup, MicroscopeCache, light_groups};
 use super::light::{FocusAt, LightBuffers, Specimen, TransmissionStats};
-use super::object_transmission::{DyeMixer, ObjectTransmission, Window, add, clear};
+use super::object_transmission::{DyeMixer, ObjectTransmission, TransmissionLayer, Window, add, clear};
 use super::overlap::Overlaps;
 use crate::detect::sum_over;
 use crate::error::ErrorKind;
@@ -23,7 +23,7 @@ use crate::phantom::{Phantom, Piece};
 use crate::recipe::{Imaging, Mixing, Restore};
 use crate::scene::{SceneLight, SceneMicroscope, View};
 use crate::threads;
-use crate::truth::{COVERED, Mask, Run};
+use crate::truth::{COVERED, Mask};
 
 /// Fraction of the extra blur in its truncated tails.
 const LOST_TAIL: f64 = 1e-5;
@@ -47,7 +47,7 @@ pub(crate) struct BrightFieldPath {
 struct ObjectPatches {
     /// One patch per light.
     patches: Vec<Patch>,
-    /// Restoration weight of each grid point, if the object has an imaged texture.
+    /// Restoration weight of each pixel, if the object has an imaged texture.
     restored: Vec<f32>,
 }
 
@@ -82,7 +82,7 @@ impl BrightFieldPath {
         let extra_blur = extra_blur.map_err(|error| ErrorKind::Optics("optics.extra_blur_um", error))?;
         let imaged = specimen.phantoms.iter().flat_map(|phantom| &phantom.pieces).any(|piece| piece.imaged);
         let restores = scene.restoration.restore != Restore::Off && imaged;
-        let feather = || Gaussian::new(scene.restoration.feather_um / scene.grid().pixel_um);
+        let feather = || Gaussian::new(scene.restoration.feather_um / scene.view.pixel_um);
         let restoration = restores.then(feather).transpose()?;
         Ok(Self {
             optics: *optics,
@@ -183,7 +183,7 @@ impl BrightFieldPath {
                     }
                     return Ok(());
                 };
-                let at_px = object_factors.window.origin.map(|at| at / i64::from(self.optics.oversampling));
+                let at_px = object_factors.window.origin;
                 let factors = object_factors.buffers.factors.iter().zip(&object_factors.absorbances);
                 for ((light, absorbances), (factor, own)) in lights.iter_mut().zip(&mut absorbances).zip(factors) {
                     light.multiply(factor, at_px);
@@ -239,12 +239,12 @@ impl BrightFieldPath {
         };
         let focuses = group.lights.iter().map(of_light).collect::<Result<Vec<Focus>, _>>()?;
         let n = self.optics.oversampling as usize;
-        let Some(window) = Window::around(phantom.pieces.iter().map(|piece| &piece.absorbance), n) else {
+        let Some(window) = Window::around(phantom.pieces.iter(), n) else {
             return Ok(None);
         };
         let margin_px = focuses.iter().map(Focus::margin_px).max().unwrap_or(0);
-        let grid = specimen.scene.grid();
-        if !window.meets(grid.width, grid.height, margin_px * n) {
+        let View { width, height, .. } = specimen.scene.view;
+        if !window.meets(width, height, margin_px) {
             return Ok(None);
         }
         let mut buffers = self.spare_buffers().pop().unwrap_or_default();
@@ -256,11 +256,11 @@ impl BrightFieldPath {
         let object_patches = match &mut cached_patches {
             Some(cached_patches) => cached_patches.get_or_insert_with(|| {
                 let mut fresh = ObjectPatches::default();
-                self.fill_patches(phantom, group, window, transmission, &mut fresh);
+                self.fill_patches(phantom, group, (window, n), transmission, &mut fresh);
                 fresh
             }),
             None => {
-                self.fill_patches(phantom, group, window, transmission, object_patches);
+                self.fill_patches(phantom, group, (window, n), transmission, object_patches);
                 object_patches
             }
         };
@@ -271,15 +271,17 @@ impl BrightFieldPath {
             imager.expose(patch, focus, scratch, factor);
             if !object_patches.restored.is_empty() {
                 let (depth_um, stage_um) = position(light);
-                let focus = imager.refocus(depth_um, stage_um)?;
-                imager.expose(patch, &focus, scratch, refocused);
-                restore(factor, refocused, &object_patches.restored, window, n);
+                let refocus = imager.refocus(depth_um, stage_um)?;
+                // Imaged textures are in the finest layer.
+                let finest = patch.layers() - 1;
+                let focus_of = |layer: usize| if layer == finest { &refocus } else { focus };
+                imager.expose_with(patch, focus_of, scratch, refocused);
+                restore(factor, refocused, &object_patches.restored, window);
             }
         }
         drop(cached_patches);
         let absorbances = factors.iter().enumerate().map(|(light, factor)| {
-            let of_piece =
-                |(piece, fraction): (&Piece, &f64)| fraction * mean_absorbance(&piece.mask, factor, window, n);
+            let of_piece = |(piece, fraction): (&Piece, &f64)| fraction * mean_absorbance(&piece.mask, factor, window);
             phantom.pieces.iter().zip(&group.fractions[index][light]).map(of_piece).collect()
         });
         let absorbances = absorbances.collect();
@@ -290,22 +292,22 @@ impl BrightFieldPath {
         &self,
         phantom: &Phantom,
         group: &LightGroup,
-        window: Window,
+        (window, n): (Window, usize),
         transmission: &mut ObjectTransmission,
         object_patches: &mut ObjectPatches,
     ) {
-        group.mixer.compose(&phantom.pieces, window, transmission);
+        group.mixer.compose(&phantom.pieces, window, n, transmission);
         object_patches.patches.resize_with(group.lights.len(), Patch::default);
-        let lights = group.lights.iter().zip(&transmission.transmittance);
-        for ((light, transmittance), patch) in lights.zip(&mut object_patches.patches) {
-            light.imager.load(transmittance, &transmission.phase_rad, window.width, patch);
+        for (index, (light, patch)) in group.lights.iter().zip(&mut object_patches.patches).enumerate() {
+            let layers: Vec<_> = transmission.layers.iter().map(|layer| patch_layer(layer, index, window)).collect();
+            light.imager.load_layers([window.width, window.height], &layers, patch);
         }
         object_patches.restored.clear();
         let imaged = phantom.pieces.iter().filter(|piece| piece.imaged);
         if let (Some(feather), true) = (&self.restoration, imaged.clone().count() > 0) {
             let mut mask = vec![0.0; window.width * window.height];
             for piece in imaged {
-                add(&mut mask, window, &binary(&piece.coverage).repeated(piece.coverage_step), 1.0);
+                add(&mut mask, window, &binary(&piece.pixel_coverage(n)), 1.0);
             }
             // Eq. 16: C′ = C ∗ G_σ.
             object_patches.restored = feather.blur(&mask, window.width, Border::Zero);
@@ -314,6 +316,18 @@ impl BrightFieldPath {
 
     fn spare_buffers(&self) -> MutexGuard<'_, Vec<PatchBuffers>> {
         self.spare_buffers.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Returns a layer of an object in a light, relative to the object's window.
+fn patch_layer(layer: &TransmissionLayer, light: usize, window: Window) -> PatchLayer<'_> {
+    PatchLayer {
+        transmittance: &layer.transmittance[light],
+        behind: layer.behind.get(light).map_or(&[], |behind| behind),
+        phase_rad: &layer.phase_rad,
+        width: layer.window.width * layer.samples_per_pixel,
+        samples_per_pixel: layer.samples_per_pixel,
+        at_px: [0, 1].map(|axis| usize::try_from(layer.window.origin[axis] - window.origin[axis]).unwrap_or(0)),
     }
 }
 
@@ -340,9 +354,13 @@ fn abbe_image(
     let abbe = Abbe::new(microscope, &params).map_err(|error| ErrorKind::Optics("optics.directions", error))?;
     let layers = layers(specimen, optics.slab_um, light, frame)?;
     let full = abbe.image(&layers, stage_um)?;
-    let rows = full.chunks_exact(size[0]).skip(margin).take(height);
-    let values = rows.flat_map(|row| row[margin..margin + width].iter().map(|light| *light as f32)).collect();
-    Ok(Factor { lattice: Lattice::Object, width, values, margin_px: 0, clipped: 0 })
+    let n = microscope.params().oversampling;
+    let pixel = |x: usize, y: usize| {
+        let rows = (margin + n * y..margin + n * (y + 1)).map(|row| &full[row * size[0] + margin + n * x..][..n]);
+        (rows.flatten().sum::<f64>() / (n * n) as f64) as f32
+    };
+    let values = (0..height / n).flat_map(|y| (0..width / n).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect();
+    Ok(Factor { width: width / n, values, margin_px: 0, clipped: 0 })
 }
 
 /// Returns the radius of the widest cone of light of all objects, µm.
@@ -358,12 +376,12 @@ fn layers(
     (mixer, light): (&DyeMixer, usize),
     frame: Window,
 ) -> Result<Vec<Layer>, ErrorKind> {
+    let n = specimen.scene.oversampling();
     let mut slabs: BTreeMap<i64, Vec<[f64; 2]>> = BTreeMap::new();
-    let mut transmission = ObjectTransmission::default();
     for (object, phantom) in specimen.scene.objects.iter().zip(specimen.phantoms) {
-        let tiles = phantom.pieces.iter().map(|piece| &piece.absorbance);
-        let Some(window) = Window::around(tiles, 1) else { continue };
-        mixer.compose(&phantom.pieces, window, &mut transmission);
+        let Some(window) = Window::around(phantom.pieces.iter(), n) else { continue };
+        let window = window.sampled(n);
+        let transmission = mixer.compose_on_grid(&phantom.pieces, window);
         let slab = libm::round(object.depth_um / slab_um) as i64;
         let amplitudes = slabs.entry(slab).or_insert_with(|| vec![[1.0, 0.0]; frame.width * frame.height]);
         let transmittance = transmission.transmittance[light].chunks_exact(window.width);
@@ -395,15 +413,12 @@ fn binary(coverage: &Tile) -> Tile {
 }
 
 /// Applies Eq. 15 to one object: I′ = I_refocused · C′ + I · (1 − C′). Both factors are of one patch at one focus.
-fn restore(factor: &mut Factor, refocused: &Factor, weights: &[f32], window: Window, n: usize) {
-    let (step, margin) = match factor.lattice {
-        Lattice::Object => (1, factor.margin_px * n),
-        Lattice::Camera => (n, factor.margin_px),
-    };
-    for (y, weights) in weights.chunks_exact(window.width * step).enumerate() {
+fn restore(factor: &mut Factor, refocused: &Factor, weights: &[f32], window: Window) {
+    let margin = factor.margin_px;
+    for (y, weights) in weights.chunks_exact(window.width).enumerate() {
         let at = (y + margin) * factor.width + margin;
         let values = factor.values[at..].iter_mut().zip(&refocused.values[at..]);
-        for ((old, new), weight) in values.zip(weights[..window.width].iter().step_by(step)) {
+        for ((old, new), weight) in values.zip(weights) {
             *old += weight * (new - *old);
         }
     }
@@ -419,24 +434,12 @@ fn illuminate(light: &mut [f32], empty: &[f32], stray: f32) {
     light.iter_mut().zip(empty).for_each(|(light, empty)| *light = empty * (stray + (1.0 - stray) * *light));
 }
 
-/// Returns the absorbance that corresponds to the mean of a factor over a mask, for a grid of `n` points per pixel and
-/// axis.
-fn mean_absorbance(mask: &Mask, factor: &Factor, window: Window, n: usize) -> f64 {
-    let (n, origin) = match factor.lattice {
-        Lattice::Object => (n, window.origin),
-        Lattice::Camera => (1, window.origin.map(|at| at / n as i64)),
-    };
-    let origin = origin.map(|at| at - (factor.margin_px * n) as i64);
-    let area = mask.area() * (n * n) as u64;
-    if area == 0 {
+/// Returns the absorbance that corresponds to the mean of a factor over a mask.
+fn mean_absorbance(mask: &Mask, factor: &Factor, window: Window) -> f64 {
+    if mask.area() == 0 {
         return 0.0;
     }
-    let n = n as u32;
-    let scaled = |run: &Run| {
-        let Run { y, x0, x1 } = *run;
-        (0..n).map(move |line| Run { y: y * n + line, x0: x0 * n, x1: x1 * n })
-    };
-    let runs: Vec<Run> = mask.runs().iter().flat_map(scaled).collect();
-    let sum = sum_over(&runs, &factor.values, factor.width, origin);
-    -libm::log10((sum / area as f64).max(f64::MIN_POSITIVE))
+    let origin = window.origin.map(|at| at - factor.margin_px as i64);
+    let sum = sum_over(mask.runs(), &factor.values, factor.width, origin);
+    -libm::log10((sum / mask.area() as f64).max(f64::MIN_POSITIVE))
 }

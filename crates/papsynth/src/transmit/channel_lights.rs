@@ -54,8 +54,9 @@ pub(super) fn light_groups(
         // Stray light is added later, so cached microscopes do not depend on it.
         stray_light: 0.0,
     };
+    let n = scene.oversampling();
     let group = |mixer: DyeMixer, lights: Vec<ChannelLight>| {
-        let fractions = threads::map(specimen.threads, specimen.phantoms, |phantom| mixer.fractions(phantom));
+        let fractions = threads::map(specimen.threads, specimen.phantoms, |phantom| mixer.fractions(phantom, n));
         LightGroup { mixer, lights, fractions }
     };
     match scene.light {

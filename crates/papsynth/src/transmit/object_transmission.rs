@@ -1,4 +1,7 @@
-//! Transmittance and phase delay of one object for each channel, on a rectangle of the slide's grid.
+//! Transmittance and phase delay of one object for each channel.
+
+use core::cmp::Ordering;
+use std::borrow::Cow;
 
 use dye_spectra::{Amounts, Colour, DYES};
 use multiversion::multiversion;
@@ -17,49 +20,72 @@ pub(super) enum DyeMixer {
     Colour(Box<Colour>),
 }
 
-/// A rectangle of the slide's grid.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// A rectangle of camera pixels.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Window {
     pub(super) origin: [i64; 2],
     pub(super) width: usize,
     pub(super) height: usize,
 }
 
-/// Transmittance and phase delay of one object on a [`Window`].
+/// Transmittance and phase delay of one object, in layers from coarse to fine.
 #[derive(Debug, Default)]
 pub(super) struct ObjectTransmission {
-    /// Transmittance, 0 to 1, for each channel.
-    pub(super) transmittance: Vec<Vec<f32>>,
-    /// Phase delay, radians; empty if the object does not refract.
-    pub(super) phase_rad: Vec<f32>,
+    pub(super) layers: Vec<TransmissionLayer>,
     /// Buffers for the absorbance or the amounts of dyes.
     amounts: [Vec<f32>; DYES],
-    zeros: Vec<f32>,
+}
+
+/// Pieces of an object that are sampled at the same distance.
+#[derive(Debug, Default)]
+pub(super) struct TransmissionLayer {
+    pub(super) window: Window,
+    pub(super) samples_per_pixel: usize,
+    /// Transmittance, 0 to 1, of this and all coarser layers, for each channel.
+    pub(super) transmittance: Vec<Vec<f32>>,
+    /// Transmittance of the coarser layers alone, for each channel; empty for the first layer.
+    pub(super) behind: Vec<Vec<f32>>,
+    /// Phase delay of all layers, radians; empty if the object does not refract, and in all layers except the first.
+    pub(super) phase_rad: Vec<f32>,
 }
 
 impl Window {
-    /// Returns the smallest rectangle of complete pixels (`n` x `n` grid points) around the tiles; `None` without
-    /// tiles.
-    pub(super) fn around<'a>(tiles: impl Iterator<Item = &'a Tile>, n: usize) -> Option<Self> {
-        let n = n as i64;
+    /// Returns the smallest rectangle around pieces; `None` without pieces. A camera pixel has `n` grid points along
+    /// each axis.
+    pub(super) fn around<'a>(pieces: impl Iterator<Item = &'a Piece>, n: usize) -> Option<Self> {
+        Self::around_tiles(pieces.map(|piece| (&piece.absorbance, n / piece.step)))
+    }
+
+    /// Returns the smallest rectangle around tiles, given with their samples per pixel and axis; `None` without tiles.
+    pub(super) fn around_tiles<'a>(tiles: impl Iterator<Item = (&'a Tile, usize)>) -> Option<Self> {
         let (mut low, mut high) = ([i64::MAX; 2], [i64::MIN; 2]);
-        for tile in tiles {
+        for (tile, samples) in tiles {
+            let samples = samples as i64;
             for (axis, length) in [tile.width, tile.height()].into_iter().enumerate() {
-                low[axis] = low[axis].min(tile.origin[axis].div_euclid(n) * n);
-                high[axis] = high[axis].max((tile.origin[axis] + length as i64 + n - 1).div_euclid(n) * n);
+                low[axis] = low[axis].min(tile.origin[axis].div_euclid(samples));
+                high[axis] = high[axis].max((tile.origin[axis] + length as i64 + samples - 1).div_euclid(samples));
             }
         }
         let side = |axis: usize| usize::try_from(high[axis].checked_sub(low[axis])?).ok().filter(|side| *side > 0);
         Some(Self { origin: low, width: side(0)?, height: side(1)? })
     }
 
-    /// Whether the rectangle intersects a grid of this size extended by a margin.
+    /// Whether the rectangle intersects an image of this size extended by a margin.
     pub(super) fn meets(self, width: usize, height: usize, margin: usize) -> bool {
         let margin = margin as i64;
         let inside = |axis: usize, length: usize, size: usize| {
             self.origin[axis] - margin < size as i64 && self.origin[axis] + length as i64 + margin > 0
         };
         inside(0, self.width, width) && inside(1, self.height, height)
+    }
+
+    /// Returns the same rectangle in samples, `samples` per pixel and axis.
+    pub(super) fn sampled(self, samples: usize) -> Self {
+        Self {
+            origin: self.origin.map(|at| at * samples as i64),
+            width: self.width * samples,
+            height: self.height * samples,
+        }
     }
 }
 
@@ -81,18 +107,20 @@ impl DyeMixer {
     }
 
     /// Returns, for each channel and piece, the fraction of the object's absorbance that the piece contributes where it
-    /// covers.
-    pub(super) fn fractions(&self, phantom: &Phantom) -> Vec<Vec<f64>> {
+    /// covers. A camera pixel has `n` grid points along each axis.
+    pub(super) fn fractions(&self, phantom: &Phantom, n: usize) -> Vec<Vec<f64>> {
         let pieces = &phantom.pieces;
+        if pieces.len() == 1 {
+            return vec![vec![1.0]; self.channels()];
+        }
+        let absorbances: Vec<_> = pieces.iter().map(|piece| piece.pixel_absorbance(n)).collect();
         // Sums of the absorbance of each piece over the area of one piece.
         let within = |piece: &Piece| -> Vec<f64> {
-            pieces
-                .iter()
-                .map(|other| other.absorbance.sum_where(&piece.coverage, piece.coverage_step, COVERED))
-                .collect()
+            let coverage = piece.pixel_coverage(n);
+            absorbances.iter().map(|absorbance| absorbance.sum_where(&coverage, COVERED)).collect()
         };
         // An object without parts contributes its complete absorbance.
-        let is_all = |piece: &Piece| pieces.len() == 1 || piece.part == Part::Whole;
+        let is_all = |piece: &Piece| piece.part == Part::Whole;
         let sums: Vec<Vec<f64>> =
             pieces.iter().map(|piece| if is_all(piece) { Vec::new() } else { within(piece) }).collect();
         let fraction = |own: usize, strengths: &[f64]| {
@@ -110,33 +138,94 @@ impl DyeMixer {
         (0..self.channels()).map(of_channel).collect()
     }
 
-    /// Computes the transmittance and phase delay of the pieces of an object.
-    pub(super) fn compose(&self, pieces: &[Piece], window: Window, transmission: &mut ObjectTransmission) {
+    /// Computes the transmittance and phase delay of an object in a window, layer by layer. A camera pixel has `n` grid
+    /// points along each axis.
+    pub(super) fn compose(&self, pieces: &[Piece], window: Window, n: usize, transmission: &mut ObjectTransmission) {
+        let ObjectTransmission { layers, amounts } = transmission;
+        let mut steps: Vec<usize> = pieces.iter().map(|piece| piece.step).collect();
+        steps.sort_unstable_by(|a, b| b.cmp(a));
+        steps.dedup();
+        layers.resize_with(steps.len(), TransmissionLayer::default);
+        for (index, (layer, &step)) in layers.iter_mut().zip(&steps).enumerate() {
+            let own = || pieces.iter().filter(|piece| piece.step == step);
+            layer.samples_per_pixel = n / step;
+            // The first layer holds the phase delay of all pieces.
+            layer.window = if index == 0 { window } else { Window::around(own(), n).unwrap_or(window) };
+            layer.behind.clear();
+            layer.phase_rad.clear();
+            let on = layer.window.sampled(layer.samples_per_pixel);
+            if index > 0 {
+                let coarser = |least: usize| pieces.iter().filter(move |piece| piece.step >= least);
+                let tiles: Vec<_> = coarser(step).map(|piece| (piece, resampled(piece, step, on))).collect();
+                self.transmittance(&tiles, on, &mut layer.transmittance, amounts);
+                let tiles: Vec<_> = tiles.into_iter().filter(|(piece, _)| piece.step > step).collect();
+                self.transmittance(&tiles, on, &mut layer.behind, amounts);
+                continue;
+            }
+            let tiles = if step == 1 {
+                let tiles: Vec<_> = own().map(|piece| (piece, Cow::Borrowed(&piece.absorbance))).collect();
+                self.transmittance(&tiles, on, &mut layer.transmittance, amounts);
+                tiles
+            } else {
+                // The mean of two points approximates that of a sample: T(A) is not linear.
+                let moments: Vec<_> = own().map(|piece| piece.absorbance.moments_within_pixels(step)).collect();
+                let mut transmit = |sign: f32, transmittance: &mut Vec<Vec<f32>>| {
+                    let tiles = own().zip(&moments).map(|(piece, [mean, deviation])| {
+                        let pairs = mean.values.iter().zip(&deviation.values);
+                        let values = pairs.map(|(mean, deviation)| mean + sign * deviation).collect();
+                        (piece, Cow::Owned(Tile { values, ..*mean }))
+                    });
+                    self.transmittance(&tiles.collect::<Vec<_>>(), on, transmittance, amounts);
+                };
+                transmit(1.0, &mut layer.transmittance);
+                transmit(-1.0, &mut layer.behind);
+                for (transmittance, other) in layer.transmittance.iter_mut().zip(&layer.behind) {
+                    average(transmittance, other);
+                }
+                layer.behind.clear();
+                own().zip(moments).map(|(piece, [mean, _])| (piece, Cow::Owned(mean))).collect()
+            };
+            let finer = pieces.iter().filter(|piece| piece.step < step && piece.phase_rad != 0.0);
+            let finer: Vec<_> = finer.map(|piece| (piece, resampled(piece, step, on))).collect();
+            for (piece, tile) in tiles.iter().chain(&finer).filter(|(piece, _)| piece.phase_rad != 0.0) {
+                layer.phase_rad.resize(on.width * on.height, 0.0);
+                add(&mut layer.phase_rad, on, tile, piece.phase_rad as f32);
+            }
+        }
+    }
+
+    /// Computes the transmittance of tiles of the same sampling in each channel.
+    fn transmittance(
+        &self,
+        tiles: &[(&Piece, Cow<'_, Tile>)],
+        window: Window,
+        transmittance: &mut Vec<Vec<f32>>,
+        amounts: &mut [Vec<f32>; DYES],
+    ) {
         let samples = window.width * window.height;
-        let ObjectTransmission { transmittance, phase_rad, amounts, zeros } = transmission;
         transmittance.resize(self.channels(), Vec::new());
         match self {
             Self::Monochrome(wavelength) => {
                 let [absorbance, ..] = amounts;
                 clear(absorbance, samples);
-                for piece in pieces {
+                for (piece, tile) in tiles {
                     let strength = dye_spectra::absorbance(&piece.dyes, *wavelength) as f32;
-                    add(absorbance, window, &piece.absorbance, strength);
+                    add(absorbance, window, tile, -strength);
                 }
-                clear(zeros, samples);
                 // Beer and Lambert: T = 10^(−A).
-                exp10_from(zeros, absorbance);
-                core::mem::swap(absorbance, &mut transmittance[0]);
+                let [transmittance] = &mut transmittance[..] else { return };
+                clear(transmittance, samples);
+                exp10_from(absorbance, transmittance);
             }
             Self::Colour(colour) => {
                 for (dye, amount) in amounts.iter_mut().enumerate() {
                     amount.clear();
                     // A dye without amounts needs no plane.
-                    if pieces.iter().any(|piece| piece.dyes[dye] > 0.0) {
+                    if tiles.iter().any(|(piece, _)| piece.dyes[dye] > 0.0) {
                         amount.resize(samples, 0.0);
                     }
-                    for piece in pieces.iter().filter(|piece| piece.dyes[dye] > 0.0) {
-                        add(amount, window, &piece.absorbance, piece.dyes[dye] as f32);
+                    for (piece, tile) in tiles.iter().filter(|(piece, _)| piece.dyes[dye] > 0.0) {
+                        add(amount, window, tile, piece.dyes[dye] as f32);
                     }
                 }
                 for channel in transmittance.iter_mut() {
@@ -147,15 +236,45 @@ impl DyeMixer {
                 colour.transmittance_into([h, e, l, o, n], [r, g, b]);
             }
         }
-        phase_rad.clear();
-        if pieces.iter().any(|piece| piece.phase_rad != 0.0) {
-            phase_rad.resize(samples, 0.0);
-            for piece in pieces.iter().filter(|piece| piece.phase_rad != 0.0) {
-                add(phase_rad, window, &piece.absorbance, piece.phase_rad as f32);
-            }
+    }
+
+    /// Computes the transmittance in each channel and the phase delay of an object on a window of the grid.
+    pub(super) fn compose_on_grid(&self, pieces: &[Piece], window: Window) -> TransmissionLayer {
+        let mut layer = TransmissionLayer { window, ..TransmissionLayer::default() };
+        let tiles: Vec<_> = pieces.iter().map(|piece| (piece, resampled(piece, 1, window))).collect();
+        self.transmittance(&tiles, window, &mut layer.transmittance, &mut Default::default());
+        for (piece, tile) in tiles.iter().filter(|(piece, _)| piece.phase_rad != 0.0) {
+            layer.phase_rad.resize(window.width * window.height, 0.0);
+            add(&mut layer.phase_rad, window, tile, piece.phase_rad as f32);
+        }
+        layer
+    }
+}
+
+/// Returns the absorbance of a piece sampled at another distance, at least in a window.
+fn resampled(piece: &Piece, step: usize, window: Window) -> Cow<'_, Tile> {
+    let tile = &piece.absorbance;
+    match piece.step.cmp(&step) {
+        Ordering::Equal => Cow::Borrowed(tile),
+        Ordering::Less => Cow::Owned(tile.coarsened(step / piece.step)),
+        Ordering::Greater => {
+            let factor = piece.step / step;
+            // Interpolation needs neighbours.
+            let low = window.origin.map(|at| at.div_euclid(factor as i64) - NEIGHBOURS);
+            let side = |length: usize| length.div_ceil(factor) + 2 * NEIGHBOURS.unsigned_abs() as usize + 1;
+            let part = tile.part(low, side(window.width), side(window.height));
+            Cow::Owned(part.refined(factor))
         }
     }
 }
+
+#[multiversion(targets = "simd")]
+fn average(values: &mut [f32], others: &[f32]) {
+    values.iter_mut().zip(others).for_each(|(value, other)| *value = 0.5 * (*value + other));
+}
+
+/// Samples around a window that interpolation uses.
+const NEIGHBOURS: i64 = 3;
 
 pub(super) fn clear(values: &mut Vec<f32>, samples: usize) {
     values.clear();

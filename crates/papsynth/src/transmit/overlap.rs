@@ -73,7 +73,7 @@ impl Overlaps {
         let indices: Vec<usize> = (0..boxes.len()).filter(|&i| meets[i]).collect();
         let objects = threads::map(specimen.threads, &indices, |&index| OverlappingObject {
             index,
-            pieces: phantoms[index].pieces.iter().map(|piece| piece.absorbance.coarsened(n)).collect(),
+            pieces: phantoms[index].pieces.iter().map(|piece| piece.pixel_absorbance(n).into_owned()).collect(),
         });
         Self { objects }
     }
@@ -136,7 +136,8 @@ impl OverlappingObject {
         } else {
             &self.pieces
         };
-        let window = Window::around(pieces.iter(), 1).expect("overlapping objects have pixels");
+        let window =
+            Window::around_tiles(pieces.iter().map(|tile| (tile, 1))).expect("overlapping objects have pixels");
         let samples = window.width * window.height;
         let blank = |samples| Tile { origin: window.origin, width: window.width, values: vec![0.0; samples] };
         let mut amounts: [Tile; DYES] = core::array::from_fn(|_| blank(0));
@@ -156,17 +157,13 @@ impl OverlappingObject {
 
 /// Returns the camera pixels over which the stain of an object is not negligible.
 fn stained_window(phantom: &Phantom, scene: &Scene) -> Option<Window> {
-    let (grid, n) = (scene.grid(), scene.oversampling());
+    let View { width, height, .. } = scene.view;
     let strong = phantom.pieces.iter().filter(|piece| {
         let dyes: f64 = piece.dyes[..DYES - 1].iter().sum();
         piece.absorbance.values.iter().any(|value| value * dyes as f32 > FAINT)
     });
-    let window = Window::around(strong.map(|piece| &piece.absorbance), n)?;
-    (scene.frame.is_some() || window.meets(grid.width, grid.height, 0)).then_some(Window {
-        origin: window.origin.map(|at| at / n as i64),
-        width: window.width / n,
-        height: window.height / n,
-    })
+    let window = Window::around(strong, scene.oversampling())?;
+    (scene.frame.is_some() || window.meets(width, height, 0)).then_some(window)
 }
 
 #[multiversion(targets = "simd")]

@@ -20,6 +20,7 @@
 
 mod plane;
 mod transform;
+mod transpose;
 
 use core::fmt::Debug;
 use core::ops::{Add, AddAssign, Mul, Sub};
@@ -27,6 +28,7 @@ use core::ops::{Add, AddAssign, Mul, Sub};
 pub use num_complex::Complex;
 pub use plane::{ComplexPlane, PlaneScratch};
 pub use transform::{LaneFft, Plans};
+pub use transpose::transposed;
 
 /// A real number in single or double precision.
 pub trait Real:
@@ -60,16 +62,3 @@ pub const ZERO: Lanes<f32, 16> = [[0.0; 16]; 2];
 
 /// A square block: `N` sequences of `N` numbers.
 pub type Square<T, const N: usize> = [[T; N]; N];
-
-/// Returns the transpose. Inlined, so that it is compiled for the caller's instruction set.
-#[inline(always)]
-#[must_use]
-pub fn transposed<T: Real, const N: usize>(from: &Square<T, N>) -> Square<T, N> {
-    let mut to = [[T::default(); N]; N];
-    for (i, to) in to.iter_mut().enumerate() {
-        for (to, from) in to.iter_mut().zip(from) {
-            *to = from[i];
-        }
-    }
-    to
-}

@@ -62,8 +62,26 @@ impl<T: Real> LaneFft<T> {
             lens[0],
             lens[1]
         );
-        if run(&self.passes, values, spare) {
+        for pass in &self.passes {
+            run(pass, values, spare);
             core::mem::swap(values, spare);
+        }
+    }
+
+    /// Writes the transform of `from` to `to`. `spare` is working memory.
+    ///
+    /// # Panics
+    ///
+    /// If a slice has another length than the plan.
+    pub fn transform<const N: usize>(&self, from: &[Lanes<T, N>], to: &mut [Lanes<T, N>], spare: &mut [Lanes<T, N>]) {
+        let lens = [from.len(), to.len(), spare.len()];
+        assert!(lens == [self.len; 3], "expected {} numbers, found {lens:?} of from, to and spare", self.len);
+        let [first, rest @ ..] = &self.passes[..] else { return to.copy_from_slice(from) };
+        let (mut done, mut next) = if rest.len().is_multiple_of(2) { (to, spare) } else { (spare, to) };
+        run(first, from, done);
+        for pass in rest {
+            run(pass, done, next);
+            core::mem::swap(&mut done, &mut next);
         }
     }
 
@@ -138,21 +156,16 @@ impl Roots {
     }
 }
 
-/// Runs all passes. Returns whether the spectrum is in `spare`.
+/// Runs a pass.
 #[multiversion(targets = "simd")]
-fn run<T: Real, const N: usize>(passes: &[Pass<T>], values: &mut [Lanes<T, N>], spare: &mut [Lanes<T, N>]) -> bool {
-    let (mut from, mut to) = (values, spare);
-    for pass in passes {
-        match pass.radix {
-            2 => by_2(pass, from, to),
-            3 => by_3(pass, from, to),
-            4 => by_4(pass, from, to),
-            5 => by_5(pass, from, to),
-            _ => by_any(pass, from, to),
-        }
-        core::mem::swap(&mut from, &mut to);
+fn run<T: Real, const N: usize>(pass: &Pass<T>, from: &[Lanes<T, N>], to: &mut [Lanes<T, N>]) {
+    match pass.radix {
+        2 => by_2(pass, from, to),
+        3 => by_3(pass, from, to),
+        4 => by_4(pass, from, to),
+        5 => by_5(pass, from, to),
+        _ => by_any(pass, from, to),
     }
-    !passes.len().is_multiple_of(2)
 }
 
 #[inline(always)]

@@ -173,10 +173,9 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
     absorbance.values.iter_mut().zip(&coverage.values).for_each(|(value, cover)| *value *= cover * strength);
     let step = scene.grid().width / scene.sheet_grid().width;
     let area_px = coverage.sum() * (step * step) as f64;
-    let absorbance = absorbance.refined(step);
     let phase_rad = body.phase_rad / body.cytoplasm_absorbance.max(MIN_ABSORBANCE);
     let whole = Piece::whole(absorbance, coverage, area_px, body.dyes);
-    let cytoplasm = Piece { part: Part::Cytoplasm, coverage_step: step, phase_rad, ..whole };
+    let cytoplasm = Piece { part: Part::Cytoplasm, step, phase_rad, ..whole };
     Ok(Phantom { pieces: vec![cytoplasm, plan.nucleus], traits: traits(body) })
 }
 
