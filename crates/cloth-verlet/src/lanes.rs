@@ -133,8 +133,13 @@ fn project_pair<const L: usize>(p: &mut Node<L>, q: &mut Node<L>, rest: &Lane<L>
 /// Clamps heights between ground and ceiling.
 #[inline(always)]
 pub(crate) fn confine<const L: usize>(now: &mut [Node<L>], ceiling: f32) {
-    for z in now.iter_mut().flat_map(|n| &mut n[2].0) {
-        *z = at_most(at_least(*z, 0.0), ceiling);
+    for node in now {
+        // On a copy: the flattened loop would be compiled to gathers and scatters.
+        let mut z = node[2];
+        for l in 0..L {
+            z[l] = at_most(at_least(z[l], 0.0), ceiling);
+        }
+        node[2] = z;
     }
 }
 
