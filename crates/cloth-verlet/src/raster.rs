@@ -74,8 +74,8 @@ impl Sheet {
         let density: Vec<f64> =
             gathered.iter().map(|[volume, projected_area]| volume / projected_area.max(MIN_PROJECTED_AREA)).collect();
         let greatest = density.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
-        let planes: Vec<Plane> =
-            self.triangles.iter().map(|t| plane(t.map(|v| (places[v as usize], density[v as usize])))).collect();
+        let mut planes = vec![[0.0; 3]; self.triangles.len()];
+        fill_planes(&mut planes, &self.triangles, &places, &density);
         // One more column holds the remainder beyond the row.
         let stride = columns.len() + 1;
         let mut sums = vec![[0.0; 2]; stride * rows.len().next_multiple_of(ROWS_AT_ONCE)];
@@ -129,8 +129,16 @@ impl Sheet {
     }
 }
 
+#[multiversion(targets = "simd")]
+fn fill_planes(planes: &mut [Plane], triangles: &[[u32; 3]], places: &[Point], density: &[f64]) {
+    for (out, corners) in planes.iter_mut().zip(triangles) {
+        *out = plane(corners.map(|v| (places[v as usize], density[v as usize])));
+    }
+}
+
 /// Returns the linear thickness through three corners; negated for a back-facing triangle, so that the sweep adds it as
 /// positive.
+#[inline(always)]
 fn plane([(a, da), (b, db), (c, dc)]: [(Point, f64); 3]) -> Plane {
     let area = cross(a, b, c);
     let plane = if area.abs() < 2.0 * SLIVER {
@@ -179,8 +187,18 @@ fn add(pixels: &mut [f32], values: &[f64]) {
     }
 }
 
+// This compiles to one vector instruction; `f64::max` also handles NaN.
+#[inline(always)]
+fn at_least(value: f64, low: f64) -> f64 {
+    if value > low { value } else { low }
+}
+
 /// Edges that are added at once.
 const LANES: usize = 8;
+
+/// Edges are sorted by the number of pixels that they cross, into this many batches with this range of numbers, so that
+/// the edges of a batch end at about the same time.
+const LENGTHS: (usize, usize) = (8, 2);
 
 /// One number for each edge of a batch.
 type Lane = [f64; LANES];
@@ -212,11 +230,9 @@ impl EdgeBatch {
         most: 0,
     };
 
-    /// Appends an edge of an image with `stride` − 1 columns.
+    /// Appends an edge, with the pixel of its upper end and the number of pixels that it crosses.
     #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixels of the image")]
-    fn push(&mut self, stride: usize, a: Point, b: Point, plane: Plane) {
-        let (column, row) = ((a[0] as usize).min(stride - 2), a[1] as usize);
+    fn push(&mut self, [a, b]: [Point; 2], plane: Plane, [column, row, at]: [usize; 3], pixels: usize) {
         let l = self.len;
         for axis in 0..2 {
             self.from[axis][l] = a[axis];
@@ -227,8 +243,8 @@ impl EdgeBatch {
         }
         self.pixel[0][l] = column as f64;
         self.pixel[1][l] = row as f64;
-        self.at[l] = row * stride + column;
-        self.most = self.most.max(column.abs_diff(b[0] as usize) + (b[1] as usize - row) + 1);
+        self.at[l] = at;
+        self.most = self.most.max(pixels);
         self.len += 1;
     }
 
@@ -236,6 +252,8 @@ impl EdgeBatch {
     /// the lower end of its edge adds zeros.
     #[inline(always)]
     fn add_to(&mut self, sums: &mut [Step], stride: usize) {
+        // Unused lanes add zeros.
+        self.plane.iter_mut().for_each(|p| p[self.len..].fill(0.0));
         let Self { from, to, plane, .. } = *self;
         let ([mut left, top], mut at) = (self.pixel, self.at);
         let [mut x, mut y] = from;
@@ -293,7 +311,8 @@ impl EdgeBatch {
                 let across = if sideways { way[l] } else { 0.0 };
                 side[l] += across;
                 left[l] += across;
-                floor[l] += if down { 1.0 } else { 0.0 };
+                // Not a sum, which would be compiled to masked stores that delay the next load.
+                floor[l] = at_least(floor[l], if down { floor[l] + 1.0 } else { 0.0 });
                 let along = if way[l] < 0.0 { usize::MAX } else { 1 };
                 at[l] = at[l].wrapping_add(if sideways {
                     along
@@ -311,19 +330,23 @@ impl EdgeBatch {
                 }
             }
         }
-        *self = Self::EMPTY;
+        (self.len, self.most) = (0, 0);
     }
 }
 
 /// Adds all edges. A triangle is the region right of its upward edges minus the region right of its downward edges.
 /// Each edge adds the difference of the planes of its two triangles.
 #[multiversion(targets = "simd")]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixels of the image")]
 fn sweep(sums: &mut [Step], stride: usize, edges: &[Edge], places: &[Point], planes: &[Plane]) {
     let size = [(stride - 1) as f64, (sums.len() / stride) as f64];
     let within = |p: Point| (0..2).all(|axis| p[axis] >= 0.0 && p[axis] < size[axis]);
-    let mut batch = EdgeBatch::EMPTY;
+    let mut batches = [const { EdgeBatch::EMPTY }; LENGTHS.0];
     let mut add = |a: Point, b: Point, plane: Plane| {
-        batch.push(stride, a, b, plane);
+        let (column, row) = ((a[0] as usize).min(stride - 2), a[1] as usize);
+        let pixels = column.abs_diff(b[0] as usize) + (b[1] as usize - row) + 1;
+        let batch = &mut batches[(pixels / LENGTHS.1).min(LENGTHS.0 - 1)];
+        batch.push([a, b], plane, [column, row, row * stride + column], pixels);
         if batch.len == LANES {
             batch.add_to(sums, stride);
         }
@@ -345,7 +368,7 @@ fn sweep(sums: &mut [Step], stride: usize, edges: &[Edge], places: &[Point], pla
             clipped(a, b, size, |a, b| add(a, b, step));
         }
     }
-    batch.add_to(sums, stride);
+    batches.iter_mut().for_each(|batch| batch.add_to(sums, stride));
 }
 
 /// Passes the parts of the edge from `a` down to `b` that are within the image to `add`. Parts beyond its left or right
