@@ -277,8 +277,7 @@ impl EdgeBatch {
                 } else {
                     f64::INFINITY
                 };
-                let below =
-                    if to[1][l] > floor[l] { (floor[l] - from[1][l]) * inverse[1][l] } else { f64::INFINITY };
+                let below = if to[1][l] > floor[l] { (floor[l] - from[1][l]) * inverse[1][l] } else { f64::INFINITY };
                 let (sideways, down) = (beside < below, below <= beside && below < f64::INFINITY);
                 let next_x = if sideways {
                     side[l]

@@ -217,14 +217,7 @@ struct WrinkleProfile {
 
 impl WrinkleProfile {
     /// Adds the wrinkle where the cell covers. `canvas` is zero before and after.
-    fn draw(
-        &self,
-        path: &[Point],
-        section: &CrossSection,
-        thickness: &mut Tile,
-        coverage: &Tile,
-        canvas: &mut [f32],
-    ) {
+    fn draw(&self, path: &[Point], section: &CrossSection, thickness: &mut Tile, coverage: &Tile, canvas: &mut [f32]) {
         let (width, height) = (thickness.width, thickness.height());
         let origin = thickness.origin.map(|at| at as f64);
         // Column range of the wrinkle in each row.
