@@ -8,8 +8,8 @@ use multiversion::multiversion;
 
 /// Sheets solved at once: the number of f32 in the widest registers.
 const LANES: usize = 16;
-/// Up to this many sheets are solved one by one, which is faster than a batch of mostly unused lanes.
-const FEW: usize = 2;
+/// Lanes of a batch of at most this many sheets.
+const HALF: usize = LANES / 2;
 
 /// A circular mesh that can be crumpled into any number of outlines.
 #[derive(Debug)]
@@ -87,12 +87,10 @@ impl Cloth {
 
     /// Solves up to [`LANES`] sheets.
     fn solved(&self, starts: &[&Start]) -> Vec<Sheet> {
-        if starts.len() <= FEW {
-            starts.iter().map(|start| self.finished(start, &self.run::<1>(&[start]).lane(0))).collect()
-        } else if starts.len() <= LANES / 2 {
-            self.solved_in_lanes::<{ LANES / 2 }>(starts)
-        } else {
-            self.solved_in_lanes::<LANES>(starts)
+        match starts.len() {
+            1 => self.solved_in_lanes::<1>(starts),
+            2..=HALF => self.solved_in_lanes::<HALF>(starts),
+            _ => self.solved_in_lanes::<LANES>(starts),
         }
     }
 

@@ -86,15 +86,15 @@ pub(crate) fn advance<const L: usize>(
 ) {
     let fall = [0.0, 0.0, gravity_dt2];
     for &v in which {
-        let v = v as usize;
+        let (n, b) = (&mut now[v as usize], &mut before[v as usize]);
         // On copies, which cannot alias, so that the compiler vectorises.
-        let (at, mut next) = (now[v], before[v]);
+        let (at, mut next) = (*n, *b);
         for axis in 0..3 {
             for l in 0..L {
                 next[axis][l] = verlet(at[axis][l], next[axis][l], fall[axis], keep);
             }
         }
-        (now[v], before[v]) = (next, at);
+        (*n, *b) = (next, at);
     }
 }
 
