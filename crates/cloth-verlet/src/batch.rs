@@ -3,6 +3,7 @@
 use crate::lanes::{Constraint, Curve, Lane, Node, advance, confine, project, single, verlet};
 use crate::mesh::{Disc, Pair};
 use crate::outline::{Outline, distance};
+use crate::refine::index;
 use crate::ring::{MovingOutline, SearchWindow};
 use crate::{Point, VerletParams, Vertex, XpbdParams};
 
@@ -16,6 +17,8 @@ pub(crate) struct Topology {
     pub(crate) bends: [Vec<Pair>; 3],
     windows: Vec<SearchWindow>,
     pub(crate) rim: usize,
+    /// The indices of all vertices.
+    vertices: Vec<u32>,
 }
 
 impl Topology {
@@ -30,6 +33,7 @@ impl Topology {
             bends: sorted(&disc.bends),
             windows: disc.points.iter().map(|&p| SearchWindow::from(p, sides)).collect(),
             rim: disc.rim,
+            vertices: (0..disc.points.len()).map(index).collect(),
         }
     }
 }
@@ -112,9 +116,9 @@ impl<const L: usize> Batch<L> {
                     }
                 }
             }
-            advance(&mut self.now, &mut self.before, keep, gravity);
+            advance(&mut self.now, &mut self.before, &topology.vertices, keep, gravity);
             self.ring.push_inside(&mut self.now, &topology.windows, 0, step);
-            confine(&mut self.now, f32::MAX);
+            confine(&mut self.now, &topology.vertices, f32::MAX);
         }
     }
 
@@ -136,8 +140,8 @@ impl<const L: usize> Batch<L> {
         let bend = constraints(params.bend_compliance, single(params.bend_yield));
         for substep in 1..=steps * params.substeps {
             let s = substep as f64 / all;
-            self.move_rim(topology.rim, single(s * s * (3.0 - 2.0 * s)));
-            advance(&mut self.now[topology.rim..], &mut self.before[topology.rim..], keep, gravity);
+            self.move_rim(&topology.vertices[..topology.rim], single(s * s * (3.0 - 2.0 * s)));
+            advance(&mut self.now, &mut self.before, &topology.vertices[topology.rim..], keep, gravity);
             // Set 0 holds the edges of the rim, whose positions are prescribed.
             for set in 1..3 {
                 project(&mut self.now, &topology.edges[set], &self.edges[set], stretch[set - 1]);
@@ -145,7 +149,7 @@ impl<const L: usize> Batch<L> {
             for set in 1..3 {
                 project(&mut self.now, &topology.bends[set], &self.bends[set], bend[set - 1]);
             }
-            confine(&mut self.now, single(params.ceiling));
+            confine(&mut self.now, &topology.vertices[topology.rim..], single(params.ceiling));
             if substep.is_multiple_of(params.substeps) {
                 self.ring.push_inside(&mut self.now, &topology.windows, topology.rim, substep / params.substeps);
             }
@@ -154,15 +158,20 @@ impl<const L: usize> Batch<L> {
 
     /// Moves the outline and the rim to the fraction `moved` of their which from start to end.
     #[inline(always)]
-    fn move_rim(&mut self, rim: usize, moved: f32) {
+    fn move_rim(&mut self, rim: &[u32], moved: f32) {
         let [from, to] = &self.outlines;
-        for (((point, node), a), b) in self.ring.points.iter_mut().zip(&mut self.now[..rim]).zip(from).zip(to) {
+        for &v in rim {
+            let v = v as usize;
+            let (a, b) = (from[v], to[v]);
+            let mut point = a;
             for axis in 0..2 {
                 for l in 0..L {
                     point[axis][l] = a[axis][l] + (b[axis][l] - a[axis][l]) * moved;
-                    node[axis][l] = point[axis][l];
                 }
             }
+            self.ring.points[v] = point;
+            let node = &mut self.now[v];
+            [node[0], node[1]] = point;
         }
     }
 }

@@ -8,8 +8,8 @@ use multiversion::multiversion;
 
 /// Sheets solved at once: the number of f32 in the widest registers.
 const LANES: usize = 16;
-/// Up to this many sheets are solved one by one, which is faster than a batch of mostly unused lanes.
-const FEW: usize = 2;
+/// Lanes of a batch of at most this many sheets.
+const HALF: usize = LANES / 2;
 
 /// A circular mesh that can be crumpled into any number of outlines.
 #[derive(Debug)]
@@ -87,12 +87,16 @@ impl Cloth {
 
     /// Solves up to [`LANES`] sheets.
     fn solved(&self, starts: &[&Start]) -> Vec<Sheet> {
-        if starts.len() <= FEW {
-            starts.iter().map(|start| self.finished(start, &self.run::<1>(&[start]).lane(0))).collect()
-        } else {
-            let batch = self.run::<LANES>(starts);
-            starts.iter().enumerate().map(|(l, start)| self.finished(start, &batch.lane(l))).collect()
+        match starts.len() {
+            1 => self.solved_in_lanes::<1>(starts),
+            2..=HALF => self.solved_in_lanes::<HALF>(starts),
+            _ => self.solved_in_lanes::<LANES>(starts),
         }
+    }
+
+    fn solved_in_lanes<const L: usize>(&self, starts: &[&Start]) -> Vec<Sheet> {
+        let batch = self.run::<L>(starts);
+        starts.iter().enumerate().map(|(l, start)| self.finished(start, &batch.lane(l))).collect()
     }
 
     fn run<const L: usize>(&self, starts: &[&Start]) -> Batch<L> {
@@ -210,10 +214,11 @@ mod tests {
     fn the_bits_of_a_sheet_do_not_depend_on_its_batch() {
         for params in [coarse(), ClothParams { vertices: 300, ..ClothParams::paper() }] {
             let cloth = Cloth::new(&params).unwrap();
+            // One batch of all lanes, and one of half of them.
             let outlines: Vec<Vec<Point>> =
-                (0..18_u8).map(|k| wavy(2.0 + f64::from(k % 4), 0.02 * f64::from(k % 7))).collect();
+                (0..22_u8).map(|k| wavy(2.0 + f64::from(k % 4), 0.02 * f64::from(k % 7))).collect();
             let borrowed: Vec<&[Point]> = outlines.iter().map(Vec::as_slice).collect();
-            let mut rngs: Vec<_> = (0..18).map(rng).collect();
+            let mut rngs: Vec<_> = (0..22).map(rng).collect();
             let together = cloth.crumple_many(&borrowed, &mut rngs);
             for (k, sheet) in together.iter().enumerate() {
                 let alone = cloth.crumple(borrowed[k], &mut rng(k as u64)).unwrap();

@@ -2,9 +2,11 @@
 
 use crate::outline::{moments, sides};
 use crate::params::range;
+use crate::refine::index;
+use crate::sheet::OUTSIDE;
 use crate::{Error, Point, Sheet};
-use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Strips of half a turn of the tube; its silhouette is then exact to 1 % of its radius.
@@ -98,10 +100,7 @@ impl Sheet {
         let beyond = |v: &[f64; 3]| (v[0] - crease.point[0]) * normal[0] + (v[1] - crease.point[1]) * normal[1];
         let mut far: Vec<f64> = self.vertices.iter().map(beyond).collect();
         let end = far.iter().fold(0.0_f64, |m, &s| m.max(s));
-        let mut ahead: Vec<usize> = (0..self.triangles.len()).collect();
-        for line in crease.strips(end) {
-            self.cut(&mut far, line, ON_LINE * crease.radius, &mut ahead);
-        }
+        self.cut(&mut far, &crease.strips(end).collect::<Vec<_>>(), ON_LINE * crease.radius);
         for (v, &s) in self.vertices.iter_mut().zip(&far) {
             if s > 0.0 {
                 let [x, z] = crease.bent(s);
@@ -112,59 +111,84 @@ impl Sheet {
         Ok(())
     }
 
-    /// Divides all triangles along the line where `far` equals `line`. `ahead` lists the triangles that may have a
-    /// corner beyond it, and is reduced to those that have; lines come in ascending order.
-    fn cut(&mut self, far: &mut Vec<f64>, line: f64, tolerance: f64, ahead: &mut Vec<usize>) {
-        let mut made = BTreeMap::new();
-        ahead.retain(|&t| self.triangles[t].iter().any(|&v| far[v as usize] - line > tolerance));
-        let before = self.triangles.len();
-        for &t in &*ahead {
-            let corners = self.triangles[t];
-            // −1 before the line, 0 on it, 1 beyond.
-            let places = corners.map(|v| {
-                let s = far[v as usize] - line;
-                i32::from(s > tolerance) - i32::from(s < -tolerance)
-            });
-            if !(places.contains(&-1) && places.contains(&1)) {
+    /// Divides all triangles along the lines where `far` equals one of `lines`, which are in ascending order.
+    fn cut(&mut self, far: &mut Vec<f64>, lines: &[f64], tolerance: f64) {
+        // For each triangle the new vertices on the side opposite each corner, in ascending order of `far`.
+        const NONE: Range<u32> = 0..0;
+        let mut made = vec![[NONE; 3]; self.triangles.len()];
+        let radius = Arc::make_mut(&mut self.radius);
+        for edge in self.edges.iter() {
+            let [i, j] = edge.ends.map(|v| v as usize);
+            let [i, j] = if far[i] < far[j] { [i, j] } else { [j, i] };
+            let crossed = lines.partition_point(|line| line - far[i] <= tolerance)
+                ..lines.partition_point(|line| far[j] - line > tolerance);
+            if crossed.is_empty() {
                 continue;
             }
-            // Rotate the triangle so that its first corner is alone on its side, or on the line.
-            let sum: i32 = places.iter().sum();
-            let Some(k) = (0..3).find(|&k| places[k] == 0).or((0..3).find(|&k| sum == -places[k])) else { continue };
-            let [a, b, c] = [corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]];
-            if places[k] == 0 {
-                let m = self.divide(&mut made, far, line, b, c);
-                let triangles = Arc::make_mut(&mut self.triangles);
-                triangles[t] = [a, b, m];
-                triangles.push([a, m, c]);
-            } else {
-                let (m, n) = (self.divide(&mut made, far, line, a, b), self.divide(&mut made, far, line, c, a));
-                let triangles = Arc::make_mut(&mut self.triangles);
-                triangles[t] = [a, m, n];
-                triangles.push([m, b, c]);
-                triangles.push([m, c, n]);
+            let first = index(far.len());
+            for &line in &lines[crossed] {
+                let part = (line - far[i]) / (far[j] - far[i]);
+                let mix = |p: f64, q: f64| p + part * (q - p);
+                let (p, q) = (self.vertices[i], self.vertices[j]);
+                self.vertices.push([mix(p[0], q[0]), mix(p[1], q[1]), mix(p[2], q[2])]);
+                let (p, q) = (self.rest[i], self.rest[j]);
+                self.rest.push([mix(p[0], q[0]), mix(p[1], q[1])]);
+                radius.push(mix(radius[i], radius[j]));
+                far.push(line);
+            }
+            for &t in edge.sides.iter().filter(|&&t| t != OUTSIDE) {
+                let opposite = self.triangles[t as usize].iter().position(|v| !edge.ends.contains(v));
+                made[t as usize][opposite.unwrap_or(0)] = first..index(far.len());
             }
         }
-        ahead.extend(before..self.triangles.len());
+        let triangles = Arc::make_mut(&mut self.triangles);
+        let [mut long, mut short] = [Vec::new(), Vec::new()];
+        for (t, made) in made.iter().enumerate().filter(|(_, made)| made.iter().any(|side| !side.is_empty())) {
+            let corners = triangles[t];
+            let mut order = [0, 1, 2];
+            order.sort_by(|&i, &j| far[corners[i] as usize].total_cmp(&far[corners[j] as usize]));
+            let [low, middle, high] = order;
+            // The vertices of the longest side, and those of the two others.
+            long.clear();
+            long.extend([corners[low]].into_iter().chain(made[middle].clone()).chain([corners[high]]));
+            short.clear();
+            short.extend([corners[low]].into_iter().chain(made[high].clone()).chain([corners[middle]]));
+            short.extend(made[low].clone().chain([corners[high]]));
+            let cyclic = (low + 1) % 3 == middle;
+            let mut free = Some(t);
+            for [a, b, c] in between(&long, &short, far) {
+                let triangle = if cyclic { [a, b, c] } else { [b, a, c] };
+                match free.take() {
+                    Some(t) => triangles[t] = triangle,
+                    None => triangles.push(triangle),
+                }
+            }
+        }
     }
+}
 
-    /// Returns the vertex where the edge a–b crosses the line.
-    fn divide(&mut self, made: &mut BTreeMap<[u32; 2], u32>, far: &mut Vec<f64>, line: f64, a: u32, b: u32) -> u32 {
-        let key = [a.min(b), a.max(b)];
-        *made.entry(key).or_insert_with(|| {
-            let [i, j] = key.map(|v| v as usize);
-            let part = (line - far[i]) / (far[j] - far[i]);
-            let mix = |p: f64, q: f64| p + part * (q - p);
-            let (p, q) = (self.vertices[i], self.vertices[j]);
-            self.vertices.push([mix(p[0], q[0]), mix(p[1], q[1]), mix(p[2], q[2])]);
-            let (p, q) = (self.rest[i], self.rest[j]);
-            self.rest.push([mix(p[0], q[0]), mix(p[1], q[1])]);
-            let radius = mix(self.radius[i], self.radius[j]);
-            Arc::make_mut(&mut self.radius).push(radius);
-            far.push(line);
-            crate::refine::index(far.len() - 1)
-        })
-    }
+/// Returns the triangles between two chains with the same ends, whose vertices are in ascending order of `far`: each
+/// has a corner on the first chain, one on the second, and then the next vertex of either. No triangle crosses a line
+/// of constant `far` on which both chains have a vertex.
+fn between<'a>(first: &'a [u32], second: &'a [u32], far: &'a [f64]) -> impl Iterator<Item = [u32; 3]> {
+    let (mut i, mut j) = (0, 0);
+    let step = move || {
+        let (a, b) = (first[i], second[j]);
+        let next = match (first.get(i + 1), second.get(j + 1)) {
+            (Some(&p), Some(&q)) if far[q as usize] < far[p as usize] => (q, false),
+            (Some(&p), _) => (p, true),
+            (None, Some(&q)) => (q, false),
+            (None, None) => return None,
+        };
+        if next.1 {
+            i += 1;
+        } else {
+            j += 1;
+        }
+        Some([a, b, next.0])
+    };
+    // At the common ends, corners coincide.
+    std::iter::from_fn(step).filter(|[a, b, c]| a != b && b != c && c != a)
 }
 
 /// Returns the silhouette of a folded polygon: the part before the line, then the mirrored flap (for a roll, each half
@@ -310,6 +334,34 @@ mod tests {
             let top = sheet.vertices().iter().fold(0.0_f64, |m, v| m.max(v[2]));
             assert!((top - 6.0).abs() < 1e-9, "{top}");
         }
+    }
+
+    #[test]
+    fn no_triangle_crosses_a_strip() {
+        let mut sheet = flat();
+        let count = sheet.vertices.len();
+        let normal = CREASE.normal();
+        let beyond = |v: &[f64; 3]| (v[0] - 40.0) * normal[0] + (v[1] + 10.0) * normal[1];
+        let mut far: Vec<f64> = sheet.vertices.iter().map(beyond).collect();
+        let lines: Vec<f64> = CREASE.strips(100.0).collect();
+        let area = |sheet: &Sheet, t: &[u32; 3]| {
+            let [a, b, c] = t.map(|v| sheet.rest[v as usize]);
+            crate::sheet::cross(a, b, c)
+        };
+        let before: f64 = sheet.triangles().iter().map(|t| area(&sheet, t)).sum();
+        sheet.cut(&mut far, &lines, 1e-9);
+        assert!(far.len() > count + 500 && far.len() == sheet.vertices.len());
+        for t in sheet.triangles() {
+            let corners = t.map(|v| far[v as usize]);
+            let (low, high) = (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
+            assert!(lines.iter().all(|line| line - low < 2e-9 || high - line < 2e-9), "{corners:?}");
+            assert!(area(&sheet, t) > 0.0);
+        }
+        let after: f64 = sheet.triangles().iter().map(|t| area(&sheet, t)).sum();
+        assert!((after / before - 1.0).abs() < 1e-12);
+        // Neighbours share their edges: Euler, V − E + F = 1.
+        sheet.update_edges();
+        assert_eq!(sheet.vertices.len() + sheet.triangles().len(), sheet.edges.len() + 1);
     }
 
     #[test]

@@ -72,11 +72,21 @@ fn correction(d: [f32; 3], rest: f32, gain: f32) -> f32 {
     gain - gain * rest / length
 }
 
-/// Applies Eq. 4 to every vertex.
+/// Applies Eq. 4 to the vertices `which`.
+///
+/// Like pairs, vertices are given by their indices: the compiler would vectorise a loop over a range of vertices, with
+/// gathers and scatters, instead of the loop over lanes.
 #[inline(always)]
-pub(crate) fn advance<const L: usize>(now: &mut [Node<L>], before: &mut [Node<L>], keep: f32, gravity_dt2: f32) {
+pub(crate) fn advance<const L: usize>(
+    now: &mut [Node<L>],
+    before: &mut [Node<L>],
+    which: &[u32],
+    keep: f32,
+    gravity_dt2: f32,
+) {
     let fall = [0.0, 0.0, gravity_dt2];
-    for (n, b) in now.iter_mut().zip(before) {
+    for &v in which {
+        let (n, b) = (&mut now[v as usize], &mut before[v as usize]);
         // On copies, which cannot alias, so that the compiler vectorises.
         let (at, mut next) = (*n, *b);
         for axis in 0..3 {
@@ -130,11 +140,16 @@ fn project_pair<const L: usize>(p: &mut Node<L>, q: &mut Node<L>, rest: &Lane<L>
     (*p, *q) = (a, b);
 }
 
-/// Clamps heights between ground and ceiling.
+/// Clamps the heights of the vertices `which` between ground and ceiling.
 #[inline(always)]
-pub(crate) fn confine<const L: usize>(now: &mut [Node<L>], ceiling: f32) {
-    for z in now.iter_mut().flat_map(|n| &mut n[2].0) {
-        *z = at_most(at_least(*z, 0.0), ceiling);
+pub(crate) fn confine<const L: usize>(now: &mut [Node<L>], which: &[u32], ceiling: f32) {
+    for &v in which {
+        let v = v as usize;
+        let mut z = now[v][2];
+        for l in 0..L {
+            z[l] = at_most(at_least(z[l], 0.0), ceiling);
+        }
+        now[v][2] = z;
     }
 }
 

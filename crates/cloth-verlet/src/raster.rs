@@ -74,8 +74,8 @@ impl Sheet {
         let density: Vec<f64> =
             gathered.iter().map(|[volume, projected_area]| volume / projected_area.max(MIN_PROJECTED_AREA)).collect();
         let greatest = density.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
-        let planes: Vec<Plane> =
-            self.triangles.iter().map(|t| plane(t.map(|v| (places[v as usize], density[v as usize])))).collect();
+        let mut planes = vec![[0.0; 3]; self.triangles.len()];
+        fill_planes(&mut planes, &self.triangles, &places, &density);
         // One more column holds the remainder beyond the row.
         let stride = columns.len() + 1;
         let mut sums = vec![[0.0; 2]; stride * rows.len().next_multiple_of(ROWS_AT_ONCE)];
@@ -129,8 +129,16 @@ impl Sheet {
     }
 }
 
+#[multiversion(targets = "simd")]
+fn fill_planes(planes: &mut [Plane], triangles: &[[u32; 3]], places: &[Point], density: &[f64]) {
+    for (out, corners) in planes.iter_mut().zip(triangles) {
+        *out = plane(corners.map(|v| (places[v as usize], density[v as usize])));
+    }
+}
+
 /// Returns the linear thickness through three corners; negated for a back-facing triangle, so that the sweep adds it as
 /// positive.
+#[inline(always)]
 fn plane([(a, da), (b, db), (c, dc)]: [(Point, f64); 3]) -> Plane {
     let area = cross(a, b, c);
     let plane = if area.abs() < 2.0 * SLIVER {
@@ -179,12 +187,169 @@ fn add(pixels: &mut [f32], values: &[f64]) {
     }
 }
 
+// This compiles to one vector instruction; `f64::max` also handles NaN.
+#[inline(always)]
+fn at_least(value: f64, low: f64) -> f64 {
+    if value > low { value } else { low }
+}
+
+/// Edges that are added at once.
+const LANES: usize = 8;
+
+/// Edges are sorted by the number of pixels that they cross, into this many batches with this range of numbers, so that
+/// the edges of a batch end at about the same time.
+const LENGTHS: (usize, usize) = (8, 2);
+
+/// One number for each edge of a batch.
+type Lane = [f64; LANES];
+
+/// Edges within the image, each with the plane that it adds to the region on its right.
+struct EdgeBatch {
+    /// x and y of the upper end.
+    from: [Lane; 2],
+    /// x and y of the lower end.
+    to: [Lane; 2],
+    plane: [Lane; 3],
+    /// Column and row of the pixel with the upper end.
+    pixel: [Lane; 2],
+    /// Index of the same pixel.
+    at: [usize; LANES],
+    len: usize,
+    /// Most pixels that an edge crosses.
+    most: usize,
+}
+
+impl EdgeBatch {
+    const EMPTY: Self = Self {
+        from: [[0.0; LANES]; 2],
+        to: [[0.0; LANES]; 2],
+        plane: [[0.0; LANES]; 3],
+        pixel: [[0.0; LANES]; 2],
+        at: [0; LANES],
+        len: 0,
+        most: 0,
+    };
+
+    /// Appends an edge, with the pixel of its upper end and the number of pixels that it crosses.
+    #[inline(always)]
+    fn push(&mut self, [a, b]: [Point; 2], plane: Plane, [column, row, at]: [usize; 3], pixels: usize) {
+        let l = self.len;
+        for axis in 0..2 {
+            self.from[axis][l] = a[axis];
+            self.to[axis][l] = b[axis];
+        }
+        for (own, p) in self.plane.iter_mut().zip(plane) {
+            own[l] = p;
+        }
+        self.pixel[0][l] = column as f64;
+        self.pixel[1][l] = row as f64;
+        self.at[l] = at;
+        self.most = self.most.max(pixels);
+        self.len += 1;
+    }
+
+    /// Adds the edges and removes them from the batch. All lanes move from pixel to pixel at the same time; a lane at
+    /// the lower end of its edge adds zeros.
+    #[inline(always)]
+    fn add_to(&mut self, sums: &mut [Step], stride: usize) {
+        // Unused lanes add zeros.
+        self.plane.iter_mut().for_each(|p| p[self.len..].fill(0.0));
+        let Self { from, to, plane, .. } = *self;
+        let ([mut left, top], mut at) = (self.pixel, self.at);
+        let [mut x, mut y] = from;
+        let (mut way, mut inverse) = ([0.0; LANES], [[0.0; LANES]; 2]);
+        // The next borders between columns and between rows.
+        let (mut side, mut floor) = (left, top);
+        for l in 0..LANES {
+            let [dx, dy] = [to[0][l] - from[0][l], to[1][l] - from[1][l]];
+            inverse[0][l] = 1.0 / dx;
+            inverse[1][l] = 1.0 / dy;
+            way[l] = if dx < 0.0 { -1.0 } else { 1.0 };
+            side[l] += if dx < 0.0 { 0.0 } else { 1.0 };
+            floor[l] += 1.0;
+        }
+        for _ in 0..self.most {
+            let (pixels, mut steps) = (at, [[0.0; LANES]; 3]);
+            for l in 0..LANES {
+                // Positions of these borders along the edge, from 0 to 1.
+                let beside = if (to[0][l] - side[l]) * way[l] > 0.0 {
+                    (side[l] - from[0][l]) * inverse[0][l]
+                } else {
+                    f64::INFINITY
+                };
+                let below = if to[1][l] > floor[l] { (floor[l] - from[1][l]) * inverse[1][l] } else { f64::INFINITY };
+                let (sideways, down) = (beside < below, below <= beside && below < f64::INFINITY);
+                let next_x = if sideways {
+                    side[l]
+                } else if down {
+                    from[0][l] + below * (to[0][l] - from[0][l])
+                } else {
+                    to[0][l]
+                };
+                let next_y = if sideways {
+                    from[1][l] + beside * (to[1][l] - from[1][l])
+                } else if down {
+                    floor[l]
+                } else {
+                    to[1][l]
+                };
+                // The integral right of the piece, over a width r, is r (q − ½ p₁ r), where q is the plane at the right
+                // border of the pixel. Along the piece r runs from r̄ − h to r̄ + h and q from q̄ − k to q̄ + k; the mean
+                // of their product is r̄ q̄ + h k / 3.
+                let [p0, p1, p2] = [plane[0][l], plane[1][l], plane[2][l]];
+                let (dy, half) = (next_y - y[l], 0.5 * p1);
+                let centre = p0 + half + p1 * left[l] + p2 * (0.5 * (y[l] + next_y));
+                let mean = left[l] + 1.0 - 0.5 * (x[l] + next_x);
+                let h = 0.5 * (x[l] - next_x);
+                let k = 0.5 * p2 * dy;
+                let covered = dy * (mean * (centre + half - half * mean) + h * (k - half * h) * (1.0 / 3.0));
+                steps[0][l] = covered;
+                steps[1][l] = dy * (centre + p1) - covered;
+                steps[2][l] = dy * p1;
+                (x[l], y[l]) = (next_x, next_y);
+                let across = if sideways { way[l] } else { 0.0 };
+                side[l] += across;
+                left[l] += across;
+                // Not a sum, which would be compiled to masked stores that delay the next load.
+                floor[l] = at_least(floor[l], if down { floor[l] + 1.0 } else { 0.0 });
+                let along = if way[l] < 0.0 { usize::MAX } else { 1 };
+                at[l] = at[l].wrapping_add(if sideways {
+                    along
+                } else if down {
+                    stride
+                } else {
+                    0
+                });
+            }
+            for l in 0..LANES {
+                if let Some([here, next]) = sums[pixels[l]..].first_chunk_mut() {
+                    here[0] += steps[0][l];
+                    next[0] += steps[1][l];
+                    next[1] += steps[2][l];
+                }
+            }
+        }
+        (self.len, self.most) = (0, 0);
+    }
+}
+
 /// Adds all edges. A triangle is the region right of its upward edges minus the region right of its downward edges.
 /// Each edge adds the difference of the planes of its two triangles.
 #[multiversion(targets = "simd")]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixels of the image")]
 fn sweep(sums: &mut [Step], stride: usize, edges: &[Edge], places: &[Point], planes: &[Plane]) {
-    let (width, height) = ((stride - 1) as f64, (sums.len() / stride) as f64);
-    let within = |[x, y]: Point| x >= 0.0 && x < width && y >= 0.0 && y < height;
+    let size = [(stride - 1) as f64, (sums.len() / stride) as f64];
+    let within = |p: Point| (0..2).all(|axis| p[axis] >= 0.0 && p[axis] < size[axis]);
+    let mut batches = [const { EdgeBatch::EMPTY }; LENGTHS.0];
+    let mut add = |a: Point, b: Point, plane: Plane| {
+        let (column, row) = ((a[0] as usize).min(stride - 2), a[1] as usize);
+        let pixels = column.abs_diff(b[0] as usize) + (b[1] as usize - row) + 1;
+        let batch = &mut batches[(pixels / LENGTHS.1).min(LENGTHS.0 - 1)];
+        batch.push([a, b], plane, [column, row, row * stride + column], pixels);
+        if batch.len == LANES {
+            batch.add_to(sums, stride);
+        }
+    };
     for edge in edges {
         let [left, right] = edge.sides.map(|t| if t == OUTSIDE { [0.0; 3] } else { planes[t as usize] });
         let [a, b] = edge.ends.map(|v| places[v as usize]);
@@ -197,90 +362,26 @@ fn sweep(sums: &mut [Step], stride: usize, edges: &[Edge], places: &[Point], pla
             continue;
         };
         if within(a) && within(b) {
-            add_edge::<false>(sums, stride, a, b, step);
+            add(a, b, step);
         } else {
-            add_edge::<true>(sums, stride, a, b, step);
+            clipped(a, b, size, |a, b| add(a, b, step));
         }
     }
+    batches.iter_mut().for_each(|batch| batch.add_to(sums, stride));
 }
 
-/// Adds `plane` to the region right of the edge from `a` down to `b`, row by row. Unless `CLIPPED`, the edge is within
-/// the image.
-#[inline(always)]
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rows clipped to the image")]
-fn add_edge<const CLIPPED: bool>(sums: &mut [Step], stride: usize, a: Point, b: Point, plane: Plane) {
+/// Passes the parts of the edge from `a` down to `b` that are within the image to `add`. Parts beyond its left or right
+/// border are moved to the border, with the same region of the image on their right.
+fn clipped(a: Point, b: Point, [width, height]: [f64; 2], mut add: impl FnMut(Point, Point)) {
     let slope = (b[0] - a[0]) / (b[1] - a[1]);
-    // Unused for a vertical edge.
-    let per_column = 1.0 / slope;
-    let (mut from, mut bottom) = (a, b[1]);
-    if CLIPPED {
-        bottom = bottom.min((sums.len() / stride) as f64);
-        if a[1] < 0.0 {
-            from = [a[0] - a[1] * slope, 0.0];
-        }
-        if from[1] >= bottom {
-            return;
-        }
-    }
-    let mut row = from[1] as usize;
-    for line in sums[row * stride..].chunks_exact_mut(stride) {
-        row += 1;
-        let floor = row as f64;
-        let to = if floor < b[1] { [a[0] + (floor - a[1]) * slope, floor] } else { b };
-        add_run::<CLIPPED>(line, from, to, per_column, plane);
-        if floor >= bottom {
-            break;
-        }
-        from = to;
-    }
-}
-
-/// Adds the part of an edge within one row, pixel by pixel.
-#[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "columns clipped to the image")]
-fn add_run<const CLIPPED: bool>(line: &mut [Step], from: Point, to: Point, per_column: f64, plane: Plane) {
-    let columns = line.len() as f64;
-    let column = |x: f64| if CLIPPED { (x.clamp(-1.0, columns) + 1.0) as i32 - 1 } else { x as i32 };
-    let (mut at, end) = (column(from[0]), column(to[0]));
-    // Direction, and offset of the border to the next pixel.
-    let (way, border) = if from[0] < to[0] { (1, 1) } else { (-1, 0) };
-    let mut here = from;
-    while at != end {
-        let x = f64::from(at + border);
-        let there = [x, from[1] + (x - from[0]) * per_column];
-        add_piece(line, at, here, there, plane);
-        here = there;
-        at += way;
-    }
-    add_piece(line, end, here, to, plane);
-}
-
-/// Adds the part of an edge within one pixel: the covered fraction of the pixel, and everything further right.
-#[inline(always)]
-#[expect(clippy::cast_sign_loss, reason = "columns clipped to the image")]
-fn add_piece(line: &mut [Step], column: i32, a: Point, b: Point, [p0, p1, p2]: Plane) {
-    let dy = b[1] - a[1];
-    let half = 0.5 * p1;
-    // The plane at the centre of pixel column i, p₀ + p₁ (i + ½) + p₂ ȳ.
-    let centre = |i: f64| p0 + half + p1 * i + p2 * (0.5 * (a[1] + b[1]));
-    if column < 0 {
-        line[0][0] += dy * centre(0.0);
-        line[0][1] += dy * p1;
-        return;
-    }
-    let left = f64::from(column);
-    if let Some([here, next]) = line[column as usize..].first_chunk_mut() {
-        // The integral right of the piece, over a width r, is r (q − ½ p₁ r), where q is the plane at the right border
-        // of the pixel. Along the piece r runs from r̄ − h to r̄ + h and q from q̄ − k to q̄ + k; the mean of their
-        // product is r̄ q̄ + h k / 3.
-        let mean = left + 1.0 - 0.5 * (a[0] + b[0]);
-        let h = 0.5 * (a[0] - b[0]);
-        let k = 0.5 * p2 * dy;
-        let centre = centre(left);
-        let covered = dy * (mean * (centre + half - half * mean) + h * (k - half * h) * (1.0 / 3.0));
-        here[0] += covered;
-        next[0] += dy * (centre + p1) - covered;
-        next[1] += dy * p1;
+    let (top, bottom) = (a[1].max(0.0), b[1].min(height));
+    let x = |y: f64| if y < b[1] { a[0] + (y - a[1]) * slope } else { b[0] };
+    // A vertical edge has no crossing: infinity and NaN become an end.
+    let crossing = |x: f64| (a[1] + (x - a[0]) / slope).max(top).min(bottom);
+    let (left, right) = (crossing(0.0), crossing(width));
+    let cuts = [top, left.min(right), left.max(right), bottom];
+    for (&from, &to) in cuts.iter().zip(&cuts[1..]).filter(|(from, to)| from < to) {
+        add([x(from).clamp(0.0, width), from], [x(to).clamp(0.0, width), to]);
     }
 }
 

@@ -139,7 +139,7 @@ impl Tile {
     fn refined_by<const N: usize>(self) -> Self {
         let (width, height) = (self.width, self.height());
         let kernels: [CubicWeights; N] = core::array::from_fn(|k| CubicWeights::new((k as f64 + 0.5) / N as f64 - 0.5));
-        let mut values = vec![0.0; self.values.len() * N * N];
+        let mut values = Vec::with_capacity(self.values.len() * N * N);
         // One row with margins for the interpolation.
         let mut line = vec![0.0; width + 2 * RADIUS];
         let zeros = vec![0.0; width];
@@ -147,11 +147,13 @@ impl Tile {
             let y = y.checked_sub(RADIUS).filter(|y| *y < height);
             y.map_or(&zeros[..], |y| &self.values[y * width..(y + 1) * width])
         };
-        for (y, rows) in values.chunks_exact_mut(N * N * width).enumerate() {
-            for (out, CubicWeights { first, weights }) in rows.chunks_exact_mut(N * width).zip(&kernels) {
+        for y in 0..height {
+            for CubicWeights { first, weights } in &kernels {
                 let four = core::array::from_fn(|k| row(y + first + k));
                 mix(&mut line[RADIUS..RADIUS + width], four, *weights);
-                refine_row(out, &line, &kernels);
+                let start = values.len();
+                values.resize(start + N * width, 0.0);
+                refine_row(&mut values[start..], &line, &kernels);
             }
         }
         Self { origin: self.origin.map(|at| at * N as i64), width: width * N, values }
@@ -201,7 +203,13 @@ impl Tile {
         let mut rasterizer = Rasterizer::new(self.width, self.height());
         self.draw(&mut rasterizer, polygon);
         let values = &mut self.values;
-        rasterizer.for_each_pixel(|index, fraction| values[index] = values[index].max(fraction.min(1.0)));
+        let mut values = values.iter_mut();
+        rasterizer.for_each_pixel(|_, fraction| {
+            let fraction = if fraction < 1.0 { fraction } else { 1.0 };
+            if let Some(value) = values.next() {
+                *value = if fraction > *value { fraction } else { *value };
+            }
+        });
     }
 
     /// Adds `weight` times the coverage of simple polygons, which must have the same orientation.
@@ -212,7 +220,12 @@ impl Tile {
         }
         // The rasteriser adds signed areas, so one pass sums all polygons.
         let values = &mut self.values;
-        rasterizer.for_each_pixel(|index, fraction| values[index] += weight * fraction);
+        let mut values = values.iter_mut();
+        rasterizer.for_each_pixel(|_, fraction| {
+            if let Some(value) = values.next() {
+                *value += weight * fraction;
+            }
+        });
     }
 
     fn draw(&self, rasterizer: &mut Rasterizer, polygon: &[Point]) {

@@ -76,11 +76,12 @@ fn covered(row: &[f32]) -> Option<(usize, usize)> {
     Some((row.iter().position(inside)?, row.iter().rposition(inside)? + 1))
 }
 
-/// Adds the fibres of the cytoskeleton.
+/// Adds the fibres of the cytoskeleton. `lines` is an image of zeros, of the same size.
 pub(super) fn add_cytoskeleton(
     absorbance: &mut Tile,
     outline: &[Point],
     cell: &CellContext<'_>,
+    lines: &mut [f32],
     rng: &mut Stream,
 ) -> Result<(), ErrorKind> {
     /// Width of a fibre, µm.
@@ -92,12 +93,9 @@ pub(super) fn add_cytoskeleton(
     let origin = absorbance.origin.map(|o| o as f64);
     let local: Vec<Point> = outline.iter().map(|p| [p[0] - origin[0], p[1] - origin[1]]).collect();
     let fibres = cell.assets.cytoskeletons.grow(&local, rng)?;
-    let mut lines = vec![0.0; absorbance.values.len()];
     let line = LineParams { width_px: (FIBRE_UM / cell.pixel_um()).max(1.0), ..LineParams::default() };
-    draw_into(&mut lines, absorbance.width, &fibres, &line)?;
-    for (value, line) in absorbance.values.iter_mut().zip(&lines) {
-        *value += strength as f32 * line;
-    }
+    draw_into(lines, absorbance.width, &fibres, &line)?;
+    add_row(&mut absorbance.values, lines, strength as f32);
     Ok(())
 }
 
@@ -161,26 +159,57 @@ pub(super) fn thin_rim(absorbance: &mut Tile, coverage: &Tile, distance_px: f64)
         return;
     }
     // At a straight rim, the mean coverage of a box is 0.5. One radius inside the rim, it is 1.
-    let width = coverage.width;
-    let mut across = vec![0.0; coverage.values.len()];
-    sums_across(&coverage.values, width, radius, &mut across);
-    let weight = 1.0 / ((2 * radius + 1) as f32 * (2 * radius + 1) as f32);
-    let row = |y: usize| across.get(y * width..(y + 1) * width);
-    let mut sums = vec![0.0; width];
-    for y in 0..radius {
-        row(y).into_iter().for_each(|row| add_row(&mut sums, row, 1.0));
-    }
+    let (width, side) = (coverage.width, 2 * radius + 1);
+    let weight = 1.0 / (side as f32 * side as f32);
+    let row = |y: usize| coverage.values.get(y * width..(y + 1) * width);
+    // Sums of columns, with margins of zeros.
+    let mut sums = vec![0.0; width + 2 * radius];
+    let mut blocks = [sums.clone(), sums.clone()];
+    let mut boxes = vec![0.0; width];
+    let add = |sums: &mut [f32], y: Option<usize>, sign: f32| {
+        y.and_then(row).into_iter().for_each(|row| add_row(&mut sums[radius..], row, sign));
+    };
+    (0..radius).for_each(|y| add(&mut sums, Some(y), 1.0));
     for (y, values) in absorbance.values.chunks_exact_mut(width).enumerate() {
-        row(y + radius).into_iter().for_each(|row| add_row(&mut sums, row, 1.0));
-        thin(values, &sums, weight);
-        y.checked_sub(radius).and_then(row).into_iter().for_each(|row| add_row(&mut sums, row, -1.0));
+        add(&mut sums, Some(y + radius), 1.0);
+        sum_windows(&mut boxes, &sums, &mut blocks, side);
+        thin(values, &boxes, weight);
+        add(&mut sums, y.checked_sub(radius), -1.0);
+    }
+}
+
+/// Sums each window of `side` consecutive values, of which there are `side` − 1 more than sums. `blocks` are buffers.
+fn sum_windows(sums: &mut [f32], values: &[f32], blocks: &mut [Vec<f32>; 2], side: usize) {
+    let [blocks, doubled] = blocks;
+    blocks.copy_from_slice(values);
+    sums.fill(0.0);
+    // A window consists of blocks, whose lengths are powers of two.
+    let (mut start, mut length) = (0, 1);
+    loop {
+        if side & length != 0 {
+            add_row(sums, &blocks[start..], 1.0);
+            start += length;
+        }
+        if start == side {
+            break;
+        }
+        add_rows(doubled, blocks, &blocks[length..]);
+        core::mem::swap(blocks, doubled);
+        length *= 2;
     }
 }
 
 #[multiversion(targets = "simd")]
-fn add_row(sums: &mut [f32], row: &[f32], sign: f32) {
+fn add_rows(sums: &mut [f32], row: &[f32], other: &[f32]) {
+    for ((sum, a), b) in sums.iter_mut().zip(row).zip(other) {
+        *sum = a + b;
+    }
+}
+
+#[multiversion(targets = "simd")]
+fn add_row(sums: &mut [f32], row: &[f32], factor: f32) {
     for (sum, value) in sums.iter_mut().zip(row) {
-        *sum += sign * value;
+        *sum += factor * value;
     }
 }
 
@@ -190,29 +219,6 @@ fn thin(values: &mut [f32], sums: &[f32], weight: f32) {
     for (value, sum) in values.iter_mut().zip(sums) {
         let inside = (2.0 * weight * sum - 1.0).clamp(0.0, 1.0);
         *value *= inside * (2.0 - inside);
-    }
-}
-
-/// Computes running sums within rows, over `radius` values to either side; values beyond the ends are 0.
-///
-/// Processes several rows at a time, because each running sum is a chain of dependent additions.
-fn sums_across(values: &[f32], width: usize, radius: usize, out: &mut [f32]) {
-    const ROWS: usize = 8;
-    let (blocks, out_blocks) = (values.chunks(ROWS * width), out.chunks_mut(ROWS * width));
-    for (block, out) in blocks.zip(out_blocks) {
-        let rows = block.len() / width;
-        let mut sums = [0.0_f32; ROWS];
-        let at = |k: usize, x: usize| if k < rows && x < width { block[k * width + x] } else { 0.0 };
-        for x in 0..radius {
-            sums.iter_mut().enumerate().for_each(|(k, sum)| *sum += at(k, x));
-        }
-        for x in 0..width {
-            for (k, sum) in sums.iter_mut().enumerate().take(rows) {
-                *sum += at(k, x + radius);
-                out[k * width + x] = *sum;
-                *sum -= x.checked_sub(radius).map_or(0.0, |x| at(k, x));
-            }
-        }
     }
 }
 
@@ -237,6 +243,64 @@ fn ramp(like: &Tile, polygon: &[Point], centre: Point, inner: f64, outer: f64) -
     ramp
 }
 
+/// A ramp like that of [`ramp`] with wide steps: drawn with pixels [`COARSE`] times as large, and interpolated linearly.
+struct CoarseRamp {
+    /// One pixel of margin surrounds the area of the tile.
+    coarse: Tile,
+    line: Vec<f32>,
+}
+
+/// Width of a coarse pixel, px.
+const COARSE: usize = 4;
+
+impl CoarseRamp {
+    fn new(like: &Tile, polygon: &[Point], centre: Point, inner: f64, outer: f64) -> Self {
+        let place = |p: Point| {
+            let at = |axis: usize| (p[axis] - like.origin[axis] as f64 + 0.5) / COARSE as f64 + 0.5;
+            [at(0), at(1)]
+        };
+        let (width, height) = (like.width.div_ceil(COARSE) + 2, like.height().div_ceil(COARSE) + 2);
+        let coarse = Tile { origin: [0, 0], width, values: vec![0.0; width * height] };
+        let polygon: Vec<Point> = polygon.iter().map(|p| place(*p)).collect();
+        Self { coarse: ramp(&coarse, &polygon, place(centre), inner, outer), line: vec![0.0; width] }
+    }
+
+    /// Writes row `y` of the tile.
+    fn row_into(&mut self, row: &mut [f32], y: usize) {
+        let width = self.coarse.width;
+        let [upper, lower] = [0, 1].map(|k| &self.coarse.values[((y + COARSE / 2) / COARSE + k) * width..][..width]);
+        mix(&mut self.line, upper, lower, PHASES[y % COARSE]);
+        interpolate_by_four(row, &self.line);
+    }
+}
+
+/// Weights of the second of two coarse pixels at the four positions of a fine one.
+const PHASES: [f32; COARSE] = [0.625, 0.875, 0.125, 0.375];
+
+#[multiversion(targets = "simd")]
+fn mix(line: &mut [f32], upper: &[f32], lower: &[f32], weight: f32) {
+    for ((out, upper), lower) in line.iter_mut().zip(upper).zip(lower) {
+        *out = upper + weight * (lower - upper);
+    }
+}
+
+/// Interpolates a row between coarse pixels; the first of them lies before the row.
+#[multiversion(targets = "simd")]
+fn interpolate_by_four(row: &mut [f32], coarse: &[f32]) {
+    let blend = |a: f32, b: f32, k: usize| a + PHASES[k] * (b - a);
+    let (whole, rest) = row.as_chunks_mut::<COARSE>();
+    let between = |near: &[f32]| {
+        let [a, b, c] = [near[0], near[1], near[2]];
+        [blend(a, b, 0), blend(a, b, 1), blend(b, c, 2), blend(b, c, 3)]
+    };
+    for (fine, near) in whole.iter_mut().zip(coarse.windows(3)) {
+        *fine = between(near);
+    }
+    if let Some(near) = coarse.get(whole.len()..whole.len() + 3) {
+        rest.copy_from_slice(&between(near)[..rest.len()]);
+    }
+}
+
 /// Adds the endoplasm: the granular inner part of the cytoplasm, denser than the outer part.
 pub(super) fn add_endoplasm(absorbance: &mut Tile, outline: &[Point], nucleus: Point, cell: &CellContext<'_>) {
     let CellContext { body, noise_fields, .. } = *cell;
@@ -246,7 +310,7 @@ pub(super) fn add_endoplasm(absorbance: &mut Tile, outline: &[Point], nucleus: P
     let (pixel_um, rng) = (cell.pixel_um(), &mut cell.stream("endoplasm"));
     let size = random::between(0.45, 0.75, rng);
     let softness = random::between(0.08, 0.3, rng);
-    let zone = ramp(absorbance, outline, nucleus, size - softness, size + softness);
+    let mut ramp_of_zone = CoarseRamp::new(absorbance, outline, nucleus, size - softness, size + softness);
     // Densest where the nucleus lifts the sheet.
     let radius = body.nucleus.radius_um / pixel_um;
     let round = perturbed_circle(radius, 0.15, 0.15, rng);
@@ -260,16 +324,22 @@ pub(super) fn add_endoplasm(absorbance: &mut Tile, outline: &[Point], nucleus: P
     let grain = FieldSampler::fine(pixel_um, rng);
     let density = body.detail.endoplasm as f32;
     let width = absorbance.width;
-    let mut field = vec![0.0_f32; width];
+    let (mut field, mut zone) = (vec![0.0_f32; width], vec![0.0_f32; width]);
     let mut texels: Texels = [0.0; SIDE + 1];
-    let rows = absorbance.values.chunks_exact_mut(width).zip(zone.values.chunks_exact(width));
-    for (y, (row, zone)) in rows.enumerate() {
-        let Some((first, end)) = covered(zone) else { continue };
+    for (y, row) in absorbance.values.chunks_exact_mut(width).enumerate() {
+        ramp_of_zone.row_into(&mut zone, y);
+        let Some((first, end)) = covered(&zone) else { continue };
         let field = &mut field[..end - first];
         noise_fields.grain().row_into(field, &grain, [first as f64, y as f64], &mut texels);
-        for ((value, inside), noise) in row[first..end].iter_mut().zip(&zone[first..end]).zip(field) {
-            *value *= 1.0 + inside * (density + density * noise.max(0.0));
-        }
+        thicken(&mut row[first..end], &zone[first..end], field, density);
+    }
+}
+
+/// Thickens a row by the density of the endoplasm where it is inside, and more where the noise is positive.
+#[multiversion(targets = "simd")]
+fn thicken(row: &mut [f32], inside: &[f32], noise: &[f32], density: f32) {
+    for ((value, inside), &noise) in row.iter_mut().zip(inside).zip(noise) {
+        *value *= 1.0 + inside * density * (1.0 + if noise > 0.0 { noise } else { 0.0 });
     }
 }
 
@@ -327,6 +397,36 @@ mod tests {
             assert!((a - b).abs() < 1e-5, "{a} {b}");
         }
         assert!((ramp.values[20 * 41 + 20] - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_coarse_ramp_is_close_to_the_ramp() {
+        for (origin, width, height) in [([-20, -20], 41, 42), ([-17, -23], 43, 47), ([-18, -22], 44, 45)] {
+            let like = Tile { origin, width, values: vec![0.0; width * height] };
+            let (polygon, centre) = (disc([1.0, 0.5], 14.0), [0.3, 0.2]);
+            let exact = ramp(&like, &polygon, centre, 0.2, 1.4);
+            let mut coarse = CoarseRamp::new(&like, &polygon, centre, 0.2, 1.4);
+            let mut row = vec![0.0; width];
+            let mut errors: Vec<f64> = Vec::new();
+            for (y, exact) in exact.values.chunks_exact(width).enumerate() {
+                coarse.row_into(&mut row, y);
+                errors.extend(exact.iter().zip(&row).map(|(a, b)| f64::from(a - b)));
+            }
+            let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+            // A step of the ramp is 1/6.
+            assert!(errors.iter().all(|error| error.abs() < 0.12) && mean.abs() < 0.01, "{mean} {errors:?}");
+        }
+    }
+
+    #[test]
+    fn sums_of_windows_match_direct_sums() {
+        for side in [1, 3, 5, 7, 13, 16, 31] {
+            let values: Vec<f32> = (0..40 + side - 1).map(|i| ((i * 37) % 101) as f32).collect();
+            let mut sums = vec![7.0; 40];
+            sum_windows(&mut sums, &values, &mut [values.clone(), values.clone()], side);
+            let direct: Vec<f32> = values.windows(side).map(|window| window.iter().sum()).collect();
+            assert_eq!(sums, direct, "{side}");
+        }
     }
 
     #[test]

@@ -26,14 +26,20 @@ const SLOPE: f64 = 0.30;
 /// Width of the slope, relative to the wrinkle.
 const SLOPE_WIDTH: f64 = 4.0;
 
-/// Adds the wrinkles of a cell to its thickness.
-pub(super) fn add(thickness: &mut Tile, coverage: &Tile, outline: &[Point], cell: &CellContext<'_>) {
+/// Adds the wrinkles of a cell to its thickness. `canvas` is an image of zeros before and after, of the same size.
+pub(super) fn add(
+    thickness: &mut Tile,
+    coverage: &Tile,
+    outline: &[Point],
+    cell: &CellContext<'_>,
+    canvas: &mut [f32],
+) {
     let (detail, pixel_um, rng) = (&cell.body.detail, cell.pixel_um(), &mut cell.stream("wrinkles"));
     let step = STEP_UM / pixel_um;
     let steps_round = || random::count(fsd_shape::perimeter(outline) / step).max(8);
     let rim = if detail.wrinkles > 0 { fsd_shape::resample_along(outline, steps_round()) } else { Vec::new() };
     let mut drawn: Vec<Vec<Point>> = Vec::new();
-    let mut canvas = vec![0.0; thickness.values.len()];
+    let section = CrossSection::new();
     for _ in 0..detail.wrinkles {
         let path = match random::uniform(rng) {
             u if u < ALONG_RIM => along_rim(outline, &rim, rng),
@@ -51,7 +57,7 @@ pub(super) fn add(thickness: &mut Tile, coverage: &Tile, outline: &[Point], cell
             fall: random::between(0.1, 2.0 * TAPER, rng),
             factors: random_factors(path.len(), rng),
         };
-        profile.draw(&path, thickness, coverage, &mut canvas);
+        profile.draw(&path, &section, thickness, coverage, canvas);
         drawn.push(path);
     }
 }
@@ -138,7 +144,62 @@ impl Autoregression {
     }
 }
 
-/// The cross-section of a wrinkle: sharp on one side, sloping on the other.
+/// Extent of a wrinkle to both sides of its crest, relative to its width; the second is that of the slope.
+const EXTENT: [f64; 2] = [3.0, 2.2 * SLOPE_WIDTH];
+
+/// A table of the cross-section of all wrinkles: a Gaussian crest with a slope on the positive side.
+struct CrossSection {
+    /// Value at each node, and the increase to the next.
+    nodes: Vec<[f32; 2]>,
+}
+
+impl CrossSection {
+    /// Nodes per standard deviation of the crest.
+    const DENSITY: u16 = 128;
+    /// Nodes before the extent, for rounding errors.
+    const MARGIN: u16 = 2;
+    /// Positions are fixed-point numbers in 2⁻¹⁶ nodes.
+    const ONE: u32 = 1 << 16;
+
+    fn new() -> Self {
+        let first = -EXTENT[0] - f64::from(Self::MARGIN) / f64::from(Self::DENSITY);
+        let count = random::count((EXTENT[1] - first) * f64::from(Self::DENSITY)) + usize::from(Self::MARGIN);
+        let mut values = vec![0.0; count];
+        tabulate(&mut values, first as f32, 1.0 / f32::from(Self::DENSITY));
+        Self { nodes: values.windows(2).map(|pair| [pair[0], pair[1] - pair[0]]).collect() }
+    }
+
+    /// Raises a row to `strength` times the cross-section. Value i has the distance `first + i·step` from the crest, in
+    /// standard deviations of the crest.
+    fn raise(&self, row: &mut [f32], [first, step]: [f64; 2], strength: f32) {
+        let density = f64::from(Self::DENSITY);
+        // The cast to 32 bits wraps, as intended: steps may be negative.
+        let fixed = |nodes: f64| (nodes * f64::from(Self::ONE)) as i64 as u32;
+        let mut position = fixed((first + EXTENT[0]) * density + f64::from(Self::MARGIN));
+        let step = fixed(step * density);
+        let last = self.nodes.len() - 1;
+        for value in row {
+            let [low, increase] = self.nodes[((position / Self::ONE) as usize).min(last)];
+            let part = (position % Self::ONE) as f32 * (1.0 / Self::ONE as f32);
+            let profile = strength * (low + part * increase);
+            *value = if profile > *value { profile } else { *value };
+            position = position.wrapping_add(step);
+        }
+    }
+}
+
+/// Computes the cross-section at equal steps, in standard deviations of the crest.
+#[multiversion(targets = "simd")]
+fn tabulate(values: &mut [f32], first: f32, step: f32) {
+    for (i, value) in values.iter_mut().enumerate() {
+        let off = first + step * i as f32;
+        let gauss = exp_f32(-0.5 * off * off);
+        let sloping = gauss + SLOPE as f32 * (exp_f32(off.max(0.0) * (-1.0 / SLOPE_WIDTH as f32)) - gauss);
+        *value = if off > 0.0 { sloping } else { gauss };
+    }
+}
+
+/// The size, strength and interruptions of a wrinkle.
 struct WrinkleProfile {
     /// Standard deviation of the crest, px.
     width: f64,
@@ -156,7 +217,7 @@ struct WrinkleProfile {
 
 impl WrinkleProfile {
     /// Adds the wrinkle where the cell covers. `canvas` is zero before and after.
-    fn draw(&self, path: &[Point], thickness: &mut Tile, coverage: &Tile, canvas: &mut [f32]) {
+    fn draw(&self, path: &[Point], section: &CrossSection, thickness: &mut Tile, coverage: &Tile, canvas: &mut [f32]) {
         let (width, height) = (thickness.width, thickness.height());
         let origin = thickness.origin.map(|at| at as f64);
         // Column range of the wrinkle in each row.
@@ -167,7 +228,7 @@ impl WrinkleProfile {
             let fade = (t / self.rise).min((1.0 - t) / self.fall).min(1.0);
             let strength = self.strength * fade * (2.0 - fade) * factor;
             if strength > 0.0 {
-                self.segment(ends, strength).paint(canvas, width, &mut touched);
+                self.segment(ends, strength).paint(section, canvas, width, &mut touched);
             }
         }
         for (y, columns) in touched.into_iter().enumerate().filter(|(_, columns)| !columns.is_empty()) {
@@ -185,10 +246,9 @@ impl WrinkleProfile {
             from: a,
             along,
             off: [-self.side * along[1], self.side * along[0]],
-            range: [[-self.width, length + self.width], [-3.0 * self.width, 2.2 * SLOPE_WIDTH * self.width]],
+            range: [[-self.width, length + self.width], [-EXTENT[0] * self.width, EXTENT[1] * self.width]],
             strength: strength as f32,
-            crest: (-0.5 / (self.width * self.width)) as f32,
-            slope: (-1.0 / (SLOPE_WIDTH * self.width)) as f32,
+            per_width: 1.0 / self.width,
         }
     }
 }
@@ -203,9 +263,8 @@ struct Segment {
     /// Range in these two directions, px.
     range: [[f64; 2]; 2],
     strength: f32,
-    /// −1/(2σ²) of the crest and −1/λ of the slope, px⁻² and px⁻¹.
-    crest: f32,
-    slope: f32,
+    /// 1/σ of the crest, px⁻¹.
+    per_width: f64,
 }
 
 impl Segment {
@@ -219,41 +278,39 @@ impl Segment {
         integers(low, high, height)
     }
 
-    /// Returns the columns of a row inside it.
-    fn columns(&self, y: usize, width: usize) -> Range<usize> {
-        let (mut low, mut high) = (0.0_f64, width as f64);
-        for (direction, [least, most]) in [self.along, self.off].into_iter().zip(self.range) {
-            // Coordinate of column 0 along the direction; each column adds direction[0].
-            let at = (y as f64 - self.from[1]) * direction[1] - self.from[0] * direction[0];
-            if direction[0].abs() > 1e-9 {
-                let [a, b] = [(least - at) / direction[0], (most - at) / direction[0]];
-                (low, high) = (low.max(a.min(b)), high.min(a.max(b)));
-            } else if at < least || at > most {
-                return 0..0;
-            }
-        }
-        integers(low, high, width)
-    }
-
     /// Raises pixels to the profile and extends the touched column range of each row.
-    fn paint(&self, canvas: &mut [f32], width: usize, touched: &mut [Range<usize>]) {
+    fn paint(&self, section: &CrossSection, canvas: &mut [f32], width: usize, touched: &mut [Range<usize>]) {
+        let directions = [self.along, self.off];
+        let inverse = directions.map(|direction| 1.0 / direction[0]);
         for y in self.rows(touched.len()) {
-            let columns = self.columns(y, width);
+            // Coordinates of column 0 in both directions; each column adds direction[0].
+            let at = directions.map(|d| (y as f64 - self.from[1]) * d[1] - self.from[0] * d[0]);
+            let (mut low, mut high) = (0.0_f64, width as f64);
+            for (k, [least, most]) in self.range.into_iter().enumerate() {
+                if directions[k][0].abs() > 1e-9 {
+                    let [a, b] = [(least - at[k]) * inverse[k], (most - at[k]) * inverse[k]];
+                    (low, high) = (low.max(a.min(b)), high.min(a.max(b)));
+                } else if at[k] < least || at[k] > most {
+                    high = -1.0;
+                }
+            }
+            let columns = integers(low, high, width);
             if columns.is_empty() {
                 continue;
             }
             touched[y] = touched[y].start.min(columns.start)..touched[y].end.max(columns.end);
-            let first = (columns.start as f64 - self.from[0]) * self.off[0] + (y as f64 - self.from[1]) * self.off[1];
+            let first = at[1] + columns.start as f64 * self.off[0];
             let row = &mut canvas[y * width..][columns];
-            raise_to_profile(row, [first as f32, self.off[0] as f32], [self.crest, self.slope], self.strength);
+            section.raise(row, [first * self.per_width, self.off[0] * self.per_width], self.strength);
         }
     }
 }
 
 /// Returns the integers between two numbers, limited to `0..count`.
 fn integers(low: f64, high: f64, count: usize) -> Range<usize> {
-    let clamped = |value: f64| value.clamp(0.0, count as f64) as usize;
-    clamped(low.ceil())..clamped(high.floor() + 1.0)
+    let whole = |value: f64| value.clamp(0.0, count as f64) as usize;
+    let start = whole(low);
+    start + usize::from((start as f64) < low)..whole(high + 1.0)
 }
 
 /// Adds painted values where the cell covers, and clears them.
@@ -262,20 +319,6 @@ fn add_and_clear(thickness: &mut [f32], cover: &[f32], painted: &mut [f32]) {
     for ((value, cover), added) in thickness.iter_mut().zip(cover).zip(painted) {
         *value += if *cover > 0.0 { *added } else { 0.0 };
         *added = 0.0;
-    }
-}
-
-/// Raises a row to a profile: a Gaussian crest with a slope on the positive side.
-///
-/// Value i has the distance `first + i·step` from the crest.
-#[multiversion(targets = "simd")]
-fn raise_to_profile(row: &mut [f32], [first, step]: [f32; 2], [crest, slope]: [f32; 2], strength: f32) {
-    for (i, value) in row.iter_mut().enumerate() {
-        let off = first + step * i as f32;
-        let gauss = exp_f32(crest * off * off);
-        let sloping = gauss + SLOPE as f32 * (exp_f32(slope * off.max(0.0)) - gauss);
-        let profile = strength * if off > 0.0 { sloping } else { gauss };
-        *value = if profile > *value { profile } else { *value };
     }
 }
 
@@ -293,7 +336,7 @@ mod tests {
             let segment = profile.segment([a, [a[0] + length[0] * along[0], a[1] + length[1] * along[1]]], 0.8);
             let mut canvas = vec![0.0; width * height];
             let mut touched = vec![width..0; height];
-            segment.paint(&mut canvas, width, &mut touched);
+            segment.paint(&CrossSection::new(), &mut canvas, width, &mut touched);
             let mut painted = 0;
             for (index, value) in canvas.iter().enumerate() {
                 let p = [(index % width) as f64 - a[0], (index / width) as f64 - a[1]];
@@ -318,11 +361,11 @@ mod tests {
         let path: Vec<Point> = (0..40).map(|i| [f64::from(i) - 15.0, 0.4 * f64::from(i) - 9.0]).collect();
         let tile = Tile { origin: [-5, -3], width: 12, values: vec![1.0; 12 * 9] };
         let (mut drawn, mut canvas) = (tile.clone(), vec![0.0; 12 * 9]);
-        profile.draw(&path, &mut drawn, &tile, &mut canvas);
+        profile.draw(&path, &CrossSection::new(), &mut drawn, &tile, &mut canvas);
         assert!(canvas.iter().all(|v| *v == 0.0));
         assert!(drawn.values.iter().any(|v| *v > 1.5) && drawn.values.iter().all(|v| (1.0..=2.0).contains(v)));
         let mut bare = tile.clone();
-        profile.draw(&path, &mut bare, &tile.blank(), &mut canvas);
+        profile.draw(&path, &CrossSection::new(), &mut bare, &tile.blank(), &mut canvas);
         assert_eq!(bare, tile);
     }
 }
