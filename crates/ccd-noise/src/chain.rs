@@ -4,8 +4,7 @@ use portable_numerics::elementary::exp_f32;
 use portable_numerics::random::SplitMix64;
 
 use crate::exposure::SaturatedRun;
-use crate::field::{blocks, padded};
-use crate::hash::{BLOCK, Block, RowWords, Stream};
+use crate::hash::{BLOCK, Block, Part, PerPixel, RowWords, Stream};
 use crate::poisson::{clamp_to_zero, poisson};
 use crate::{CameraParams, PhotonNoise, ReadNoise};
 
@@ -31,12 +30,12 @@ pub(crate) struct Marker<'a> {
 }
 
 impl Marker<'_> {
-    /// Records the non-zero pixels of a block at `x`; adjacent pixels form one run.
+    /// Records the non-zero pixels of a block; adjacent pixels form one run.
     #[cold]
     #[inline(never)]
-    fn mark(&mut self, x: u32, full: &[u32; BLOCK]) {
+    fn mark(&mut self, part: &Part, full: &PerPixel<u32>) {
         let Some(runs) = &mut self.runs else { return };
-        for (x, _) in (0..).map(|i| x.wrapping_add(i)).zip(full).filter(|(_, full)| **full != 0) {
+        for (x, _) in (0..).map(|i| part.x.wrapping_add(i)).zip(&**full).filter(|(_, full)| **full != 0) {
             let x1 = x.wrapping_add(1);
             match runs.last_mut() {
                 Some(last) if last.y == self.y && last.x1 == x => last.x1 = x1,
@@ -77,7 +76,7 @@ impl Chain {
 
     /// Returns the mean electrons of a block of pixels, from light and dark current.
     #[inline(always)]
-    fn means(&self, electrons: &[f32; BLOCK], pixels: Option<&PixelPattern>) -> [f32; BLOCK] {
+    fn means(&self, electrons: &PerPixel<f32>, pixels: Option<&PixelPattern>) -> PerPixel<f32> {
         let mut means = *electrons;
         for (i, mean) in means.iter_mut().enumerate() {
             let light = clamp_to_zero(*mean);
@@ -91,17 +90,16 @@ impl Chain {
     #[inline(always)]
     fn one_normal(
         &self,
-        means: &[f32; BLOCK],
+        means: &PerPixel<f32>,
         pixels: Option<&PixelPattern>,
-        noise: &mut [f32; BLOCK],
-        shot: &[f32; BLOCK],
+        noise: &mut PerPixel<f32>,
         block: &Block<'_>,
-    ) -> [f32; BLOCK] {
+    ) -> PerPixel<f32> {
         let mut everywhere = true;
-        for mean in means {
+        for mean in &**means {
             everywhere &= *mean >= self.normal_from;
         }
-        let mut charge = if everywhere { *means } else { poisson(means, shot, block) };
+        let mut charge = if everywhere { *means } else { poisson(means, block) };
         for i in 0..BLOCK {
             let read = pixels.map_or(self.read_noise, |pixels| pixels.read_noise[i]);
             let both = (means[i].min(self.full_well) + read * read).sqrt();
@@ -112,22 +110,22 @@ impl Chain {
         charge
     }
 
-    /// Writes the grey levels of the block at `x` to `out`, and returns the number of saturated pixels. `before` and
+    /// Writes the grey levels of a part of a row to `out`, and returns the number of saturated pixels. `before` and
     /// `after` are the charges before and after read noise.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "the lowest 16 bits hold the level")]
     fn convert(
         &self,
         full_well: f32,
-        [before, after]: [&[f32; BLOCK]; 2],
-        x: u32,
+        [before, after]: [&PerPixel<f32>; 2],
+        part: &Part,
         out: &mut [u16],
         marker: &mut Marker<'_>,
     ) -> usize {
         /// Adding 2²³ to a smaller integer leaves the integer in the lowest mantissa bits.
         const UNIT: f32 = 8_388_608.0;
-        let mut codes = [0; BLOCK];
-        let mut full = [0; BLOCK];
+        let mut codes = PerPixel([0; BLOCK]);
+        let mut full = PerPixel([0; BLOCK]);
         for i in 0..BLOCK {
             let dn = self.level(after[i]);
             // ⌊y + ½⌋ within the range of the converter.
@@ -135,15 +133,17 @@ impl Chain {
             let saturated = (before[i] >= full_well) | (dn + 0.5 >= self.highest);
             full[i] = u32::from(saturated);
         }
+        let out = &mut out[part.pixels.clone()];
         if let Some(out) = out.first_chunk_mut() {
-            *out = codes;
+            *out = codes.0;
         } else {
-            full[out.len()..].fill(0);
-            out.copy_from_slice(&codes[..out.len()]);
+            full[..part.first].fill(0);
+            full[part.first + out.len()..].fill(0);
+            out.copy_from_slice(part.within(&codes));
         }
         let saturated = full.iter().sum::<u32>();
         if saturated != 0 {
-            marker.mark(x, &full);
+            marker.mark(part, &full);
         }
         saturated as usize
     }
@@ -152,12 +152,12 @@ impl Chain {
 /// Returns N + d + σ·n; d is 0 without a fixed pattern.
 #[inline(always)]
 fn with_read_noise(
-    charge: &[f32; BLOCK],
-    noise: &[f32; BLOCK],
-    read: &[f32; BLOCK],
+    charge: &PerPixel<f32>,
+    noise: &PerPixel<f32>,
+    read: &PerPixel<f32>,
     pixels: Option<&PixelPattern>,
-) -> [f32; BLOCK] {
-    let mut after = [0.0; BLOCK];
+) -> PerPixel<f32> {
+    let mut after = PerPixel([0.0; BLOCK]);
     for i in 0..BLOCK {
         let offset = pixels.map_or(charge[i], |pixels| charge[i] + pixels.offset[i]);
         after[i] = offset + noise[i] * read[i];
@@ -202,25 +202,22 @@ fn expose(
     marker: &mut Marker<'_>,
 ) -> usize {
     let mut saturated = 0;
-    let both = electrons.chunks(BLOCK).zip(out.chunks_mut(BLOCK));
-    for (x, (electrons, out)) in blocks(x).zip(both) {
-        // `first_chunk` copies full blocks; only the last block of a row needs padding.
-        let electrons = electrons.first_chunk().copied().unwrap_or_else(|| padded(electrons));
-        let (block, pixels) = (row.block(x), pattern.map(|pattern| pattern.block(x)));
-        let (pixels, [shot, read]) = (pixels.as_ref(), block.normal_pairs());
-        let means = chain.means(&electrons, pixels);
+    for part in Part::of_row(x, electrons.len()) {
+        let (block, pixels) = (row.block(part.x), pattern.map(|pattern| pattern.block(part.x)));
+        let pixels = pixels.as_ref();
+        let means = chain.means(&part.of(electrons), pixels);
         // g_po and the standard deviation of g_g of Eq. 13
-        let mut noise = pixels.map_or([chain.read_noise; BLOCK], |pixels| pixels.read_noise);
+        let mut noise = pixels.map_or(PerPixel([chain.read_noise; BLOCK]), |pixels| pixels.read_noise);
         let mut charge = match chain.photon_noise {
-            PhotonNoise::Exact => poisson(&means, &shot, &block),
+            PhotonNoise::Exact => poisson(&means, &block),
             PhotonNoise::Off => means,
-            PhotonNoise::NormalAbove { .. } => chain.one_normal(&means, pixels, &mut noise, &shot, &block),
+            PhotonNoise::NormalAbove { .. } => chain.one_normal(&means, pixels, &mut noise, &block),
         };
-        for charge in &mut charge {
+        for charge in &mut *charge {
             *charge = charge.min(chain.full_well);
         }
-        let after = with_read_noise(&charge, &noise, &read, pixels);
-        saturated += chain.convert(chain.full_well, [&charge, &after], x, out, marker);
+        let after = with_read_noise(&charge, &noise, &block.normals(Stream::Read), pixels);
+        saturated += chain.convert(chain.full_well, [&charge, &after], &part, out, marker);
     }
     saturated
 }
@@ -235,21 +232,23 @@ pub(crate) fn gather_row(
     electrons: &[f32],
     charge: &mut [u32],
 ) {
-    let both = electrons.chunks(BLOCK).zip(charge.chunks_mut(BLOCK));
-    for (x, (electrons, charge)) in blocks(0).zip(both) {
-        let (block, pixels) = (row.block(x), pattern.map(|pattern| pattern.block(x)));
-        let means = chain.means(&padded(electrons), pixels.as_ref());
-        let [shot, _] = block.normal_pairs();
-        let mut collected =
-            if chain.photon_noise == PhotonNoise::Off { means.map(f32::round) } else { poisson(&means, &shot, &block) };
+    for part in Part::of_row(0, electrons.len()) {
+        let (block, pixels) = (row.block(part.x), pattern.map(|pattern| pattern.block(part.x)));
+        let means = chain.means(&part.of(electrons), pixels.as_ref());
+        let mut collected = if chain.photon_noise == PhotonNoise::Off {
+            PerPixel(means.map(f32::round))
+        } else {
+            poisson(&means, &block)
+        };
         if let PhotonNoise::NormalAbove { .. } = chain.photon_noise {
+            let shot = block.normals(Stream::Shot);
             for i in 0..BLOCK {
                 let normal = (means[i] + means[i].sqrt() * shot[i]).round().max(0.0);
                 collected[i] = if means[i] >= chain.normal_from { normal } else { collected[i] };
             }
         }
-        for (charge, collected) in charge.iter_mut().zip(collected) {
-            *charge = collected as u32;
+        for (charge, collected) in charge[part.pixels.clone()].iter_mut().zip(part.within(&collected)) {
+            *charge = *collected as u32;
         }
     }
 }
@@ -266,16 +265,17 @@ pub(crate) fn read_row(
     marker: &mut Marker<'_>,
 ) -> usize {
     let mut saturated = 0;
-    for (x, (charge, out)) in blocks(0).zip(charge.chunks(BLOCK).zip(out.chunks_mut(BLOCK))) {
-        let pixels = pattern.map(|pattern| pattern.block(x));
-        let noise = pixels.as_ref().map_or([chain.read_noise; BLOCK], |pixels| pixels.read_noise);
-        let [_, read] = row.block(x).normal_pairs();
-        let mut before = [0.0; BLOCK];
-        for (before, &charge) in before.iter_mut().zip(charge) {
+    for part in Part::of_row(0, charge.len()) {
+        let pixels = pattern.map(|pattern| pattern.block(part.x));
+        let noise = pixels.as_ref().map_or(PerPixel([chain.read_noise; BLOCK]), |pixels| pixels.read_noise);
+        let charge = part.of(charge);
+        let mut before = PerPixel([0.0; BLOCK]);
+        for (before, charge) in before.iter_mut().zip(*charge) {
             *before = charge as f32;
         }
+        let read = row.block(part.x).normals(Stream::Read);
         let after = with_read_noise(&before, &noise, &read, pixels.as_ref());
-        saturated += chain.convert(full_well as f32, [&before, &after], x, out, marker);
+        saturated += chain.convert(full_well as f32, [&before, &after], &part, out, marker);
     }
     saturated
 }
@@ -300,11 +300,11 @@ pub(crate) struct PatternRow<'a> {
 /// The fixed pattern of a block of pixels.
 struct PixelPattern {
     /// Relative response to light, mean 1.
-    response: [f32; BLOCK],
+    response: PerPixel<f32>,
     /// Offset in electrons, mean 0.
-    offset: [f32; BLOCK],
+    offset: PerPixel<f32>,
     /// Standard deviation of the read noise, in electrons.
-    read_noise: [f32; BLOCK],
+    read_noise: PerPixel<f32>,
 }
 
 impl Pattern {
@@ -335,16 +335,24 @@ impl PatternRow<'_> {
     fn block(&self, x: u32) -> PixelPattern {
         let Pattern { prnu, dsnu, read_noise, spread, .. } = *self.pattern;
         let block = self.words.block(x);
-        let [mut response, mut offset] = block.normal_pairs();
-        for i in 0..BLOCK {
-            response[i] = (1.0 + prnu * response[i]).max(0.0);
-            offset[i] *= dsnu;
-        }
-        let mut noise = [read_noise; BLOCK];
-        if spread > 0.0 {
-            let [normal, _] = block.normal_pairs_of(Stream::Chance, Stream::Fine);
+        let (mut response, mut offset, mut noise) =
+            (PerPixel([1.0; BLOCK]), PerPixel([0.0; BLOCK]), PerPixel([read_noise; BLOCK]));
+        if prnu > 0.0 {
+            let normals = block.normals(Stream::Shot);
             for i in 0..BLOCK {
-                noise[i] = read_noise * exp_f32(spread * normal[i]);
+                response[i] = (1.0 + prnu * normals[i]).max(0.0);
+            }
+        }
+        if dsnu > 0.0 {
+            let normals = block.normals(Stream::Read);
+            for i in 0..BLOCK {
+                offset[i] = dsnu * normals[i];
+            }
+        }
+        if spread > 0.0 {
+            let normals = block.normals(Stream::Spread);
+            for i in 0..BLOCK {
+                noise[i] = read_noise * exp_f32(spread * normals[i]);
             }
         }
         PixelPattern { response, offset, read_noise: noise }

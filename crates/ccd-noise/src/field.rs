@@ -1,4 +1,4 @@
-use crate::hash::{BLOCK, BLOCK_STEP, RowWords};
+use crate::hash::{Part, RowWords, Stream};
 use crate::poisson::poisson;
 
 /// A noise field: a pure function of a key and of the pixel position. Rows, tiles and threads in any order give the
@@ -61,33 +61,18 @@ pub(crate) fn assert_rows(len: usize, width: usize) {
     assert!(width > 0 && len.is_multiple_of(width), "{len} pixels are not a multiple of the width, {width}",);
 }
 
-/// Iterates over the positions of blocks in a row that starts at `x`.
-pub(crate) fn blocks(x: u32) -> impl Iterator<Item = u32> {
-    (0..).map(move |i: u32| x.wrapping_add(i.wrapping_mul(BLOCK_STEP)))
-}
-
 #[multiversion::multiversion(targets = "simd")]
 fn normal_row(row: &RowWords, x: u32, out: &mut [f32]) {
-    for (x, out) in blocks(x).zip(out.chunks_mut(BLOCK)) {
-        let block = row.block(x);
-        let [_, read] = block.normal_pairs();
-        out.copy_from_slice(&read[..out.len()]);
+    for part in Part::of_row(x, out.len()) {
+        let normals = row.block(part.x).normals(Stream::Read);
+        out[part.pixels.clone()].copy_from_slice(part.within(&normals));
     }
 }
 
 #[multiversion::multiversion(targets = "simd")]
 fn poisson_row(row: &RowWords, x: u32, means: &[f32], out: &mut [f32]) {
-    for (x, (means, out)) in blocks(x).zip(means.chunks(BLOCK).zip(out.chunks_mut(BLOCK))) {
-        let block = row.block(x);
-        let [shot, _] = block.normal_pairs();
-        out.copy_from_slice(&poisson(&padded(means), &shot, &block)[..means.len()]);
+    for part in Part::of_row(x, out.len()) {
+        let counts = poisson(&part.of(means), &row.block(part.x));
+        out[part.pixels.clone()].copy_from_slice(part.within(&counts));
     }
-}
-
-/// Pads the last values of a row with zeros to a full block.
-#[inline(always)]
-pub(crate) fn padded(values: &[f32]) -> [f32; BLOCK] {
-    let mut block = [0.0; BLOCK];
-    block[..values.len()].copy_from_slice(values);
-    block
 }

@@ -1,39 +1,38 @@
 //! Exact Poisson deviates: branch-free blocks, and a slow path for the few pixels that need it.
 
 use portable_numerics::elementary::exp_f64;
-use portable_numerics::random::{SplitMix64, open_uniform, open_unit};
+use portable_numerics::random::{SplitMix64, normal, open_uniform, open_unit};
 
-use crate::hash::{BLOCK, Block, Stream};
+use crate::hash::{BLOCK, Block, PerPixel, Stream};
 
-/// Means below this use inversion, larger means use a normal proposal. Both are exact and equally fast at this mean.
-const INVERSION_BELOW: f32 = 20.0;
+/// Means below this use inversion, larger means use a normal proposal. Both are exact.
+const INVERSION_BELOW: f32 = 10.0;
 
 /// Larger means count as this one, 2²⁴. It exceeds any full-well capacity, and counts up to it are exact in single
 /// precision.
 const LARGEST_MEAN: f32 = 16_777_216.0;
 
 /// Number of terms of inversion: the probability of a larger count is below 1e-24.
-const INVERSION_TERMS: usize = 96;
+const INVERSION_TERMS: usize = 64;
 
-/// Returns one Poisson deviate per mean, from normal deviates. Negative means and NaN count as 0.
+/// Returns one Poisson deviate per mean. Negative means and NaN count as 0.
 #[inline(always)]
-pub(crate) fn poisson(means: &[f32; BLOCK], normals: &[f32; BLOCK], block: &Block<'_>) -> [f32; BLOCK] {
-    let chances = block.words(Stream::Chance);
+pub(crate) fn poisson(means: &PerPixel<f32>, block: &Block<'_>) -> PerPixel<f32> {
     let mut means = *means;
-    for mean in &mut means {
+    for mean in &mut *means {
         *mean = clamp_to_zero(*mean).min(LARGEST_MEAN);
     }
     let (least, most) = extremes(&means);
     if most < INVERSION_BELOW {
-        return by_inversion(&means, &chances, &block.words(Stream::Fine));
+        return by_inversion(&means, &block.places, &block.words(Stream::Fine));
     }
-    let mut counts = from_normals(&means, normals, &chances, block);
+    let mut counts = from_normals(&means, block);
     if least < INVERSION_BELOW {
         let mut small = means;
-        for mean in &mut small {
+        for mean in &mut *small {
             *mean = if *mean < INVERSION_BELOW { *mean } else { 0.0 };
         }
-        let summed = by_inversion(&small, &chances, &block.words(Stream::Fine));
+        let summed = by_inversion(&small, &block.places, &block.words(Stream::Fine));
         for i in 0..BLOCK {
             counts[i] = if means[i] < INVERSION_BELOW { summed[i] } else { counts[i] };
         }
@@ -50,9 +49,9 @@ pub(crate) fn clamp_to_zero(mean: f32) -> f32 {
 /// Returns the smallest and largest of non-negative numbers. Their bit patterns have the same order, and integer
 /// comparison vectorises.
 #[inline(always)]
-fn extremes(means: &[f32; BLOCK]) -> (f32, f32) {
+fn extremes(means: &PerPixel<f32>) -> (f32, f32) {
     let (mut least, mut most) = (u32::MAX, 0);
-    for mean in means {
+    for mean in &**means {
         least = least.min(mean.to_bits());
         most = most.max(mean.to_bits());
     }
@@ -61,9 +60,9 @@ fn extremes(means: &[f32; BLOCK]) -> (f32, f32) {
 
 /// Returns deviates by inversion: the number of cumulative probabilities below a uniform deviate.
 #[inline(always)]
-fn by_inversion(means: &[f32; BLOCK], high: &[u32; BLOCK], low: &[u32; BLOCK]) -> [f32; BLOCK] {
+fn by_inversion(means: &PerPixel<f32>, high: &PerPixel<u32>, low: &PerPixel<u32>) -> PerPixel<f32> {
     const STEP: f64 = 1.0 / 4_294_967_296.0;
-    let mut counts = [0.0; BLOCK];
+    let mut counts = PerPixel([0.0; BLOCK]);
     // Smaller groups than elsewhere, because the slowest pixel determines the time of its group.
     const FEW: usize = 16;
     for at in (0..BLOCK).step_by(FEW) {
@@ -96,29 +95,24 @@ fn by_inversion(means: &[f32; BLOCK], high: &[u32; BLOCK], low: &[u32; BLOCK]) -
     counts
 }
 
-/// Ahrens and Dieter's method PD (doi:10.1145/355993.355997): K = ⌊µ + √µ·z⌋ is a Poisson deviate except for the
-/// missing skewness. A K below µ is rejected with a probability of nearly (µ - K)³/6µ², 0.13/√µ on average. A deviate
-/// from the remaining probability above µ replaces it.
+/// Rejection from a transformed normal deviate z: K = ⌊µ + √µ·z + (z² + 2)/6⌋, the Cornish–Fisher expansion of the
+/// Poisson distribution, whose probabilities differ by about (3z² - z⁴)/72µ. A K is rejected with a probability of
+/// 0.024/µ on average; a deviate from the excess of the Poisson distribution over that of K replaces it.
 #[inline(always)]
-fn from_normals(
-    means: &[f32; BLOCK],
-    normals: &[f32; BLOCK],
-    chances: &[u32; BLOCK],
-    block: &Block<'_>,
-) -> [f32; BLOCK] {
-    let mut counts = [0.0; BLOCK];
-    let mut open = [0_u32; BLOCK];
+fn from_normals(means: &PerPixel<f32>, block: &Block<'_>) -> PerPixel<f32> {
+    let normals = block.normals(Stream::Shot);
+    let mut counts = PerPixel([0.0; BLOCK]);
+    let mut open = PerPixel([0_u32; BLOCK]);
     for i in 0..BLOCK {
         let mean = means[i].max(INVERSION_BELOW);
         // The integer part is separated, so that the fraction keeps full precision.
         let whole = mean.floor();
         let part = mean - whole;
-        let step = (part + mean.sqrt() * normals[i]).floor();
+        let square = normals[i] * normals[i];
+        let step = (part + mean.sqrt() * normals[i] + (square + 2.0) * (1.0 / 6.0)).floor();
         counts[i] = whole + step;
-        let short = part - step;
-        // Squeeze test: acceptance is certain, always for K >= µ.
-        let accepted = short * short * short <= 6.0 * mean * mean * open_unit(chances[i]);
-        open[i] = u32::from(!(accepted & (counts[i] >= 0.0)));
+        // Squeeze test: acceptance is certain.
+        open[i] = u32::from(square * square > SQUEEZE * mean * open_unit(block.places[i]));
     }
     for at in (0..BLOCK).step_by(16) {
         if open[at..at + 16].iter().fold(0, |any, o| any | o) == 0 {
@@ -126,98 +120,86 @@ fn from_normals(
         }
         for i in at..at + 16 {
             if open[i] != 0 && means[i] >= INVERSION_BELOW {
-                counts[i] = exact_count(means[i], counts[i], open_unit(chances[i]), block.rare(i));
+                counts[i] = exact_count(means[i], counts[i], open_unit(block.places[i]), block.rare(i));
             }
         }
     }
     counts
 }
 
+/// The probability of rejection is below z⁴ / (28µ) for every z of a count.
+const SQUEEZE: f32 = 28.0;
+
+/// The Poisson probability of a count is at most 1 + 0.055/µ times that of its proposal.
+const EXCESS: f64 = 0.055;
+
 /// Returns the deviate of a pixel that failed the squeeze test: `count` if it passes the quotient test, otherwise a
 /// deviate from the excess of the Poisson distribution over that of the proposals.
 #[cold]
 #[inline(never)]
-#[expect(clippy::cast_possible_truncation, reason = "counts below 2²⁴ are exact in single precision")]
+#[expect(clippy::cast_possible_truncation, reason = "counts below 2²⁵ from single precision")]
 fn exact_count(mean: f32, count: f32, chance: f32, mut words: SplitMix64) -> f32 {
-    let quotient = PoissonQuotient::new(mean);
-    let count = f64::from(count);
-    if count >= 0.0 && 1.0 - f64::from(chance) <= quotient.ratio(count) {
-        return count as f32;
+    let proposal = Proposal::new(mean);
+    if f64::from(chance) > 1.0 - proposal.ratio(f64::from(count)) {
+        return count;
     }
-    // Rejection from a double exponential distribution centred at the maximum of the excess.
     loop {
-        let height = open_uniform(&mut words);
-        let side = 2.0 * open_uniform(&mut words) - 1.0;
-        let from_centre = -libm::log(height);
-        let t = EXCESS_CENTRE + if side < 0.0 { -from_centre } else { from_centre };
-        if t <= EXCESS_START {
-            continue;
-        }
-        let count = (quotient.mean + quotient.root * t).floor();
-        let excess = quotient.proposed(count) * (quotient.ratio(count) - 1.0);
-        if side.abs() * EXCESS_BOUND * height <= excess * quotient.mean {
+        let count = proposal.count(normal(&mut words));
+        if open_uniform(&mut words) * EXCESS / proposal.mean <= proposal.ratio(count) - 1.0 {
             return count as f32;
         }
     }
 }
 
-/// Lower limit of the excess in standard deviations, for means of at least 10.
-const EXCESS_START: f64 = -0.6744;
-/// Position of the maximum of the excess, in standard deviations.
-const EXCESS_CENTRE: f64 = 1.8;
-/// Maximum of µ · excess / exp(-|t - centre|).
-const EXCESS_BOUND: f64 = 0.1069;
-
 /// The Poisson distribution and that of the proposals, for a mean of at least 10.
-struct PoissonQuotient {
+struct Proposal {
     mean: f64,
     root: f64,
 }
 
-impl PoissonQuotient {
+impl Proposal {
     fn new(mean: f32) -> Self {
         let mean = f64::from(mean);
         Self { mean, root: mean.sqrt() }
     }
 
-    /// Returns the probability of ⌊µ + √µ·z⌋ = k for a standard normal z.
-    fn proposed(&self, count: f64) -> f64 {
-        let x = self.centre(count);
-        let density = exp_f64(-0.5 * x * x) / (core::f64::consts::TAU * self.mean).sqrt();
-        density * self.bin(x)
+    /// Returns the count proposed for a normal deviate.
+    fn count(&self, z: f64) -> f64 {
+        (self.mean + self.root * z + (z * z + 2.0) / 6.0).floor()
     }
 
-    /// Returns the Poisson probability of k, µᵏ e⁻µ / k!, divided by that of its proposal.
-    fn ratio(&self, count: f64) -> f64 {
-        let x = self.centre(count);
-        let normal = 0.5 * x * x;
+    /// Returns the smallest normal deviate of a count of at least 0.
+    fn least(&self, count: f64) -> f64 {
+        // √(3µ + 6K - 2) - 3√µ without cancellation.
+        (6.0 * (count - self.mean) - 2.0) / ((3.0 * self.mean + 6.0 * count - 2.0).sqrt() + 3.0 * self.root)
+    }
+
+    /// Returns the probability of a proposal.
+    fn proposed(&self, count: f64) -> f64 {
+        let [low, high] = [count, count + 1.0].map(|count| self.least(count) * core::f64::consts::FRAC_1_SQRT_2);
+        // Differences of the smaller tail.
+        let (low, high) = if low > 0.0 { (-high, -low) } else { (low, high) };
+        0.5 * (libm::erfc(-high) - libm::erfc(-low))
+    }
+
+    /// Returns the Poisson probability, µᵏ e⁻µ / k!.
+    fn poisson(&self, count: f64) -> f64 {
         if count < 10.0 {
             let factorial = (1..=10).map(f64::from).take_while(|&k| k <= count).product::<f64>();
-            let poisson = exp_f64(count * libm::log(self.mean) - self.mean + normal) / factorial;
-            return poisson * (core::f64::consts::TAU * self.mean).sqrt() / self.bin(x);
+            return exp_f64(count * libm::log(self.mean) - self.mean) / factorial;
         }
         // Stirling's series; its error is below 6e-11 for counts of at least 10.
         let inverse = 1.0 / count;
         let square = inverse * inverse;
         let stirling = inverse * (1.0 / 12.0 - square * (1.0 / 360.0 - square * (1.0 / 1260.0)));
         let short = self.mean - count;
-        let exponent = count * libm::log1p(short * inverse) - short - stirling + normal;
-        exp_f64(exponent) * (self.mean * inverse).sqrt() / self.bin(x)
+        let exponent = count * libm::log1p(short * inverse) - short - stirling;
+        exp_f64(exponent) / (core::f64::consts::TAU * count).sqrt()
     }
 
-    /// Returns the centre of the bin of proposals for a count, in standard deviations.
-    fn centre(&self, count: f64) -> f64 {
-        (count + 0.5 - self.mean) / self.root
-    }
-
-    /// Returns the mean of the normal density over the bin of width h = 1/√µ, divided by its value at the centre: a
-    /// series in h with an error below 1e-9.
-    fn bin(&self, x: f64) -> f64 {
-        let (x2, h2) = (x * x, 1.0 / self.mean);
-        let second = x2 - 1.0;
-        let fourth = (x2 - 6.0) * x2 + 3.0;
-        let sixth = ((x2 - 15.0) * x2 + 45.0) * x2 - 15.0;
-        1.0 + h2 * (second / 24.0 + h2 * (fourth / 1920.0 + h2 * (sixth / 322_560.0)))
+    /// Returns the Poisson probability of a count divided by that of its proposal.
+    fn ratio(&self, count: f64) -> f64 {
+        if count < 0.0 { 0.0 } else { self.poisson(count) / self.proposed(count) }
     }
 }
 
@@ -225,51 +207,53 @@ impl PoissonQuotient {
 mod tests {
     use super::*;
 
-    const MEANS: [f32; 9] = [20.0, 20.7, 31.3, 50.0, 123.4, 1e3, 17_850.0, 3e5, 1e6];
+    const MEANS: [f32; 11] = [10.0, 10.4, 13.7, 20.0, 31.3, 50.0, 123.4, 1e3, 17_850.0, 3e5, 1.6e7];
 
-    fn counts_around(quotient: &PoissonQuotient, from: f64, to: f64) -> impl Iterator<Item = f64> {
-        let first = (quotient.mean + from * quotient.root).floor().max(0.0);
-        let last = (quotient.mean + to * quotient.root).floor();
+    /// Returns the counts whose normal deviates are within a range.
+    fn counts_around(proposal: &Proposal, from: f64, to: f64) -> impl Iterator<Item = f64> {
+        let first = proposal.count(from).max(0.0);
+        let last = proposal.count(to);
         core::iter::successors(Some(first), |k| Some(k + 1.0)).take_while(move |&k| k <= last)
     }
 
     #[test]
     fn proposal_and_poisson_probabilities_are_correct() {
         for mean in MEANS {
-            let quotient = PoissonQuotient::new(mean);
-            for k in counts_around(&quotient, -6.0, 6.0) {
-                let [low, high] = [k, k + 1.0].map(|k| (k - quotient.mean) / quotient.root);
-                let tail = |x: f64| 0.5 * libm::erfc(x.abs() / core::f64::consts::SQRT_2);
-                let bin =
-                    if low < 0.0 && high > 0.0 { 1.0 - tail(low) - tail(high) } else { (tail(low) - tail(high)).abs() };
-                assert!((quotient.proposed(k) / bin - 1.0).abs() < 2e-7, "{mean}: {k}");
-                let wanted = libm::exp(k * libm::log(quotient.mean) - quotient.mean - libm::lgamma(k + 1.0));
-                let got = quotient.proposed(k) * quotient.ratio(k);
-                assert!((got / wanted - 1.0).abs() < 1e-8, "{mean}: {k}");
+            let proposal = Proposal::new(mean);
+            let (mut sum, mut rejected) = (0.0, 0.0);
+            for k in counts_around(&proposal, -6.0, 6.0) {
+                let proposed = proposal.proposed(k);
+                sum += proposed;
+                rejected += (proposed - proposal.poisson(k)).max(0.0);
+                for z in [proposal.least(k) + 1e-9, proposal.least(k + 1.0) - 1e-9] {
+                    assert_eq!(proposal.count(z), k, "{mean}");
+                }
+                let wanted = libm::exp(k * libm::log(proposal.mean) - proposal.mean - libm::lgamma(k + 1.0));
+                assert!((proposal.poisson(k) / wanted - 1.0).abs() < (1e-14 * k).max(1e-8), "{mean}: {k}");
             }
+            let negative = 0.5 * libm::erfc(-proposal.least(0.0) * core::f64::consts::FRAC_1_SQRT_2);
+            assert!((sum + negative - 1.0).abs() < 1e-8, "{mean}: {sum}");
+            assert!((0.022..0.025).contains(&(rejected * proposal.mean)), "{mean}: {rejected}");
         }
     }
 
-    /// The method is exact if the squeeze test accepts only what the quotient test accepts, if there is no excess below
-    /// its lower limit, and if the excess stays below its bound.
+    /// The method is exact if the squeeze test accepts only what the quotient test accepts, and if the excess stays
+    /// below its bound. Normal deviates in single precision are below 6.8.
     #[test]
     fn squeeze_and_bound_hold() {
         for mean in MEANS {
-            let quotient = PoissonQuotient::new(mean);
-            for k in counts_around(&quotient, -9.0, 9.0) {
-                let short = quotient.mean - k;
-                let squeeze = 1.0 - short * short * short / (6.0 * quotient.mean * quotient.mean);
-                assert!(squeeze.min(1.0) <= quotient.ratio(k) + 1e-9, "{mean}: {k}");
-                let [low, high] = [k, k + 1.0].map(|k| (k - quotient.mean) / quotient.root);
-                let excess = quotient.proposed(k) * (quotient.ratio(k) - 1.0);
-                if low < EXCESS_START {
-                    assert!(excess <= 1e-12, "{mean}: {k}");
-                } else {
-                    let farthest = (low - EXCESS_CENTRE).abs().max((high - EXCESS_CENTRE).abs());
-                    let bound = EXCESS_BOUND / quotient.mean * libm::exp(-farthest);
-                    assert!(excess <= bound, "{mean}: {k}");
-                }
+            let proposal = Proposal::new(mean);
+            for k in counts_around(&proposal, -6.9, 6.9) {
+                let [low, high] = [k, k + 1.0].map(|k| proposal.least(k));
+                let smallest = if low < 0.0 && high > 0.0 { 0.0 } else { low.abs().min(high.abs()) };
+                let squeeze = smallest * smallest * smallest * smallest / (f64::from(SQUEEZE) * proposal.mean);
+                let ratio = proposal.ratio(k);
+                assert!(1.0 - squeeze <= ratio + 1e-9, "{mean}: {k}");
+                assert!(ratio - 1.0 <= EXCESS / proposal.mean, "{mean}: {k}");
             }
+            // All deviates of counts below 0 are open to rejection.
+            let least = proposal.least(0.0);
+            assert!(least < -6.9 || least * least * least * least > f64::from(SQUEEZE) * proposal.mean, "{mean}");
         }
     }
 }

@@ -1,6 +1,6 @@
-//! Detects self-intersections of an outline, by a sweep over its edges.
+//! Detects self-intersections of an outline: none if it surrounds its centroid once, else by a sweep over its edges.
 
-use crate::outline::{Point, cross, edges, sub};
+use crate::outline::{Point, centroid, cross, edges, sub};
 
 /// Returns whether the closed outline touches or intersects itself.
 ///
@@ -23,9 +23,24 @@ pub fn self_intersects(outline: &[Point]) -> bool {
     if points.len() < 3 || !finite {
         return true;
     }
+    if is_star(&points) {
+        return false;
+    }
     let count = points.len();
     let overlaps = |i: usize| edges_overlap(points[i], points[(i + 1) % count], points[(i + 2) % count]);
     (0..count).any(overlaps) || finds_crossing(&points)
+}
+
+/// Returns whether the outline surrounds its centroid once and every ray from the centroid crosses it once. Such an
+/// outline does not intersect itself. Returns false for angles within rounding errors.
+fn is_star(points: &[Point]) -> bool {
+    const ROUNDING: f64 = 1e-12;
+    let centre = centroid(points);
+    let size = points.iter().flatten().fold(0.0_f64, |size, v| size.max(v.abs()));
+    let turns =
+        |sign: f64| edges(points).all(|(p, q)| sign * cross(sub(p, centre), sub(q, centre)) > ROUNDING * size * size);
+    let upwards = edges(points).filter(|(p, q)| p[1] < centre[1] && q[1] >= centre[1]).count();
+    upwards == 1 && (turns(1.0) || turns(-1.0))
 }
 
 /// Returns whether the edge q–r overlaps the edge p–q.

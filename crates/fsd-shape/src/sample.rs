@@ -11,8 +11,10 @@ pub(crate) struct FleishmanPolynomial {
 
 /// Continuation steps from the normal distribution to the target moments, small enough for Newton's method to converge.
 const STEPS: u32 = 32;
-/// Newton iterations of each continuation step.
+/// Maximum number of Newton iterations of each continuation step.
 const NEWTON_STEPS: u32 = 8;
+/// Change at which the iterations stop: the next change would be its square.
+const CONVERGED: f64 = 1e-9;
 /// Maximum final error of the moments.
 const TOLERANCE: f64 = 1e-8;
 
@@ -33,6 +35,9 @@ impl FleishmanPolynomial {
                 let change = solve(Self::jacobian(p), error)?;
                 for (value, by) in p.iter_mut().zip(change) {
                     *value -= by;
+                }
+                if change.iter().all(|by| by.abs() < CONVERGED) {
+                    break;
                 }
             }
         }

@@ -102,20 +102,17 @@ impl Canvas {
     pub(crate) fn paste(&mut self, corner: [usize; 2], number: usize, source: &Source, place: usize, seam: Seam) {
         let mut scratch = core::mem::take(&mut self.scratch);
         self.set_weights(corner, source, place, seam, &mut scratch);
-        for y in 0..self.patch {
-            for x in 0..self.patch {
-                let i = self.index(corner, [x, y]);
-                let from = place + y * source.stride() + x;
-                let new = source.pixels[from];
-                let weight = match self.origins[i] {
-                    Some(_) => scratch.weights[y * self.patch + x],
-                    None => 1.0,
-                };
+        for (y, weights) in scratch.weights.chunks_exact(self.patch).enumerate() {
+            let (start, from) = (self.index(corner, [0, y]), place + y * source.stride());
+            // The pixels of a row of a patch are in one row of the source.
+            let unpadded = from - from / source.stride() * ROW_PADDING;
+            let here = self.pixels[start..].iter_mut().zip(&mut self.origins[start..]);
+            for (x, (((pixel, origin), new), weight)) in here.zip(&source.pixels[from..]).zip(weights).enumerate() {
+                let weight = if origin.is_some() { *weight } else { 1.0 };
                 if weight >= 0.5 {
-                    let row = from / (source.width + ROW_PADDING);
-                    self.origins[i] = Some(Origin { source: number, pixel: from - row * ROW_PADDING });
+                    *origin = Some(Origin { source: number, pixel: unpadded + x });
                 }
-                self.pixels[i] = if weight == 1.0 { new } else { self.pixels[i] + weight * (new - self.pixels[i]) };
+                *pixel = if weight == 1.0 { *new } else { *pixel + weight * (new - *pixel) };
             }
         }
         self.scratch = scratch;
@@ -155,10 +152,12 @@ impl Canvas {
         weights.resize(patch * patch, 1.0);
         match seam {
             Seam::Feather => {
-                for (i, weight) in weights.iter_mut().enumerate() {
-                    let across = if left { feather(i % patch, overlap) } else { 1.0 };
-                    let down = if above { feather(i / patch, overlap) } else { 1.0 };
-                    *weight = across.min(down);
+                for (y, row) in weights.chunks_exact_mut(patch).enumerate() {
+                    let down = if above { feather(y, overlap) } else { 1.0 };
+                    for (x, weight) in row.iter_mut().enumerate() {
+                        let across = if left { feather(x, overlap) } else { 1.0 };
+                        *weight = across.min(down);
+                    }
                 }
             }
             Seam::MinCut { feather_px } => {

@@ -262,6 +262,12 @@ fn touching_counts_as_intersecting() {
 fn self_intersections_of_flat_and_irregular_outlines() {
     let sliver: Vec<Point> = (0..1000).map(|k| [f64::from(k), 0.0]).chain([[500.0, 1e-9]]).collect();
     assert!(!self_intersects(&sliver));
+    // Every turn about the centre has the same direction, but there are two rounds.
+    let star = |turns: f64| {
+        let angle = |k: u32| core::f64::consts::TAU * turns * f64::from(k) / 21.0;
+        (0..21).map(|k| [90.0 + libm::cos(angle(k)), libm::sin(angle(k)) - 70.0]).collect::<Vec<Point>>()
+    };
+    assert_eq!([1.0, -1.0, 2.0, -2.0].map(|turns| self_intersects(&star(turns))), [false, false, true, true]);
     // Two long edges and a thousand short ones.
     let mut comet = regular(1000, 1e-3);
     comet[0] = [1e3, 0.0];

@@ -85,27 +85,18 @@ impl Bacillus {
         for point in rods.iter_mut().flatten() {
             *point = placed([point[0] - middle[0], point[1] - middle[1]], turn, context.centre);
         }
-        let mut coverage = Tile::around(rods.iter().flatten(), half_width + 2.0);
-        coverage.for_each(|p, value| {
-            // Coverage of a pixel from the distance of its centre to the edge of the rod.
-            let nearest = rods
-                .iter()
-                .flat_map(|rod| rod.windows(2))
-                .fold(f64::INFINITY, |least, part| least.min(distance(p, part[0], part[1])));
-            *value = (half_width - nearest + 0.5).clamp(0.0, (2.0 * half_width).min(1.0)) as f32;
-        });
-        let mut tile = coverage.clone();
-        for value in &mut tile.values {
-            *value *= self.absorbance.max(MIN_ABSORBANCE) as f32;
+        let mut canvas = ObjectCanvas::around(rods.iter().flatten(), half_width + 2.0);
+        for part in rods.iter().flat_map(|rod| rod.windows(2)) {
+            canvas.stroke_max(&Stroke::even(part[0], part[1], half_width), self.absorbance.max(MIN_ABSORBANCE));
         }
         let (length_um, width_um) = (self.length_um, self.width_um);
         let area = (length_um - width_um).max(0.0) * width_um + core::f64::consts::FRAC_PI_4 * width_um * width_um;
         let area_px = match self.rods {
             1 => area / (context.pixel_um * context.pixel_um),
-            _ => coverage.values.iter().map(|share| f64::from(*share)).sum(),
+            _ => canvas.coverage.sum(),
         };
         let dyes = context.dyes.bacillus;
-        Phantom::whole(tile, coverage, area_px, dyes).with_phase(self.phase_rad, self.absorbance)
+        Phantom::whole(canvas.absorbance, canvas.coverage, area_px, dyes).with_phase(self.phase_rad, self.absorbance)
     }
 }
 
@@ -135,13 +126,4 @@ fn appended(before: &[Point], next: &[Point], kink: f64, gap: f64) -> Vec<Point>
     let lead = libm::atan2(next[1][1] - next[0][1], next[1][0] - next[0][0]);
     let first = next[0];
     next.iter().map(|p| placed([p[0] - first[0], p[1] - first[1]], heading - lead, start)).collect()
-}
-
-/// Returns the distance from a point to a line segment.
-fn distance(p: Point, a: Point, b: Point) -> f64 {
-    let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
-    let length = dx * dx + dy * dy;
-    let t = if length > 0.0 { (((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / length).clamp(0.0, 1.0) } else { 0.0 };
-    let (ex, ey) = (p[0] - a[0] - t * dx, p[1] - a[1] - t * dy);
-    (ex * ex + ey * ey).sqrt()
 }

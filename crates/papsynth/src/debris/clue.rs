@@ -122,28 +122,53 @@ fn widened(tile: &Tile, place: &Tile) -> Tile {
 
 /// Returns the mean over squares of 2·radius + 1 pixels.
 fn averaged(tile: &Tile, radius: usize) -> Tile {
-    let mut out = tile.clone();
     let (width, height) = (tile.width, tile.height());
-    let mut line = Vec::new();
-    let mut along = |values: &mut [f32], start: usize, step: usize, count: usize| {
-        line.clear();
-        line.extend((0..count).map(|i| values[start + i * step]));
-        let mut sum: f32 = line.iter().take(radius).sum();
-        for i in 0..count {
-            if i + radius < count {
-                sum += line[i + radius];
-            }
-            if i > radius {
-                sum -= line[i - radius - 1];
-            }
-            values[start + i * step] = (sum / (2 * radius + 1) as f32).clamp(0.0, 1.0);
+    let weight = 1.0 / (2 * radius + 1) as f32;
+    let mut across = tile.blank();
+    for (out, row) in across.values.chunks_exact_mut(width).zip(tile.values.chunks_exact(width)) {
+        let mut sum: f32 = row.iter().take(radius).sum();
+        for (x, out) in out.iter_mut().enumerate() {
+            sum += row.get(x + radius).unwrap_or(&0.0);
+            sum -= x.checked_sub(radius + 1).map_or(0.0, |x| row[x]);
+            *out = weight * sum;
         }
-    };
-    for y in 0..height {
-        along(&mut out.values, y * width, 1, width);
     }
-    for x in 0..width {
-        along(&mut out.values, x, width, height);
+    let mut out = tile.blank();
+    let mut sums = vec![0.0; width];
+    let add = |sums: &mut [f32], y: usize, sign: f32| {
+        let row = &across.values[y * width..][..width];
+        sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += sign * value);
+    };
+    (0..radius.min(height)).for_each(|y| add(&mut sums, y, 1.0));
+    for (y, row) in out.values.chunks_exact_mut(width).enumerate() {
+        if y + radius < height {
+            add(&mut sums, y + radius, 1.0);
+        }
+        if y > radius {
+            add(&mut sums, y - radius - 1, -1.0);
+        }
+        row.iter_mut().zip(&sums).for_each(|(value, sum)| *value = (weight * sum).clamp(0.0, 1.0));
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn averages_match_sums_over_squares() {
+        let values = (0..13 * 9).map(|i| f32::from(u8::from(i * 7 % 5 < 3))).collect();
+        let tile = Tile { origin: [2, -3], width: 13, values };
+        for radius in [1_usize, 3, 8, 20] {
+            let mean = averaged(&tile, radius);
+            for (i, found) in mean.values.iter().enumerate() {
+                let near = |a: usize, b: usize| a.abs_diff(b) <= radius;
+                let square =
+                    tile.values.iter().enumerate().filter(|(j, _)| near(j % 13, i % 13) && near(j / 13, i / 13));
+                let wanted = square.map(|(_, value)| value).sum::<f32>() / ((2 * radius + 1) * (2 * radius + 1)) as f32;
+                assert!((found - wanted).abs() < 1e-5, "{radius} {i}: {found} {wanted}");
+            }
+        }
+    }
 }

@@ -70,7 +70,7 @@ impl Speckle {
                 }
             };
         });
-        let area = coverage.values.iter().map(|v| f64::from(*v)).sum();
+        let area = coverage.sum();
         let mut tile = coverage.clone();
         for value in &mut tile.values {
             *value *= self.absorbance.max(MIN_ABSORBANCE) as f32;

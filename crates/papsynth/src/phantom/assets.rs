@@ -85,13 +85,16 @@ impl Cytoskeletons {
 
     /// Returns the cytoskeleton lines of one cell inside its outline.
     pub(crate) fn grow(&self, outline: &[Point], rng: &mut Stream) -> Result<Vec<DescentPath>, ErrorKind> {
+        /// Step between the points of the outline that distances are measured to: some 2 µm.
+        const STEP: usize = 4;
+        let outline: Vec<Point> = outline.iter().step_by(STEP).copied().collect();
         let number = random::below(TORI, rng);
         let torus = self.tori[number].get_or_init(|| {
             let mut torus_rng = Key { seed: 0, index: 0 }.stream("studio", number as u64, "torus");
             let torus = Torus::new(TORUS_SITES, self.lloyd_passes, &mut torus_rng);
             torus.expect("a diagram with this number of sites is valid")
         });
-        Ok(self.skeleton.grow_from(torus, outline, rng)?)
+        Ok(self.skeleton.grow_from(torus, &outline, rng)?)
     }
 }
 

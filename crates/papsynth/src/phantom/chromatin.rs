@@ -1,6 +1,7 @@
 //! The texture of nuclei: donors and their patches (paper, section "Texture synthesis", Figs. 4, 5).
 
 use fsd_shape::ShapeModel;
+use multiversion::multiversion;
 use quilt_texture::{QuiltParams, Quilter, Source};
 use spectral_field::{FieldParams, Padding, SpectralField, Spectrum};
 
@@ -201,14 +202,33 @@ pub(crate) fn interpolate(profile: &[f64], at: f64) -> f64 {
 
 /// Shifts and scales pixels to mean 0 and variance 1 inside a mask; pixels outside become 0.
 pub(super) fn standardise(pixels: &mut [f32], mask: &[f32]) {
-    let inside = || pixels.iter().zip(mask).filter(|(_, m)| **m >= 0.5).map(|(p, _)| f64::from(*p));
-    let count = inside().count().max(1) as f64;
-    let mean = inside().sum::<f64>() / count;
-    let variance = inside().map(|p| (p - mean) * (p - mean)).sum::<f64>() / count;
+    let [count, sum, _] = sums_inside(pixels, mask, 0.0);
+    let mean = sum / count.max(1.0);
+    let [_, _, squares] = sums_inside(pixels, mask, mean);
+    let variance = squares / count.max(1.0);
     let scale = if variance > 0.0 { 1.0 / variance.sqrt() } else { 0.0 };
     for (pixel, mask) in pixels.iter_mut().zip(mask) {
         *pixel = if *mask > 0.0 { ((f64::from(*pixel) - mean) * scale) as f32 } else { 0.0 };
     }
+}
+
+/// Returns the number of pixels inside a mask, and the sums of their differences from `centre` and of the squares, in a
+/// fixed order.
+#[multiversion(targets = "simd")]
+fn sums_inside(pixels: &[f32], mask: &[f32], centre: f64) -> [f64; 3] {
+    /// Number of partial sums.
+    const LANES: usize = 16;
+    let mut sums = [[0.0; LANES]; 3];
+    for (pixels, mask) in pixels.chunks(LANES).zip(mask.chunks(LANES)) {
+        for (i, (pixel, mask)) in pixels.iter().zip(mask).enumerate() {
+            let inside = if *mask >= 0.5 { 1.0 } else { 0.0 };
+            let difference = inside * (f64::from(*pixel) - centre);
+            sums[0][i] += inside;
+            sums[1][i] += difference;
+            sums[2][i] += difference * difference;
+        }
+    }
+    sums.map(|lanes| lanes.iter().sum())
 }
 
 /// Returns the fraction of the standard deviation of chromatin that remains in images of the measuring microscope.
@@ -246,15 +266,18 @@ impl DonorGrid {
         let size = |pixels: usize| random::count((pixels as f64 * ratio).ceil()) + 2;
         let (width, height) = (size(coverage.width), size(coverage.height()));
         let mut mask = vec![0.0; width * height];
-        for (i, value) in mask.iter_mut().enumerate() {
-            // All image pixels that interpolate from here need texture.
-            let at = |position: usize, count: usize| random::count(position as f64 / ratio).min(count - 1);
-            let (x, y) = (at(i % width, coverage.width), at(i / width, coverage.height()));
-            for (nx, ny) in [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)] {
-                let (nx, ny) = (nx.min(coverage.width - 1), ny.min(coverage.height() - 1));
-                if coverage.values[ny * coverage.width + nx] > 0.0 {
-                    *value = 1.0;
-                }
+        // All image pixels that interpolate from here need texture.
+        let near = |position: usize, count: usize| {
+            let at = random::count(position as f64 / ratio).min(count - 1);
+            [at, (at + 1).min(count - 1)]
+        };
+        let columns: Vec<[usize; 2]> = (0..width).map(|x| near(x, coverage.width)).collect();
+        for (y, row) in mask.chunks_exact_mut(width).enumerate() {
+            let [upper, lower] =
+                near(y, coverage.height()).map(|y| &coverage.values[y * coverage.width..][..coverage.width]);
+            for (value, &[left, right]) in row.iter_mut().zip(&columns) {
+                let covered = upper[left].max(upper[right]).max(lower[left].max(lower[right]));
+                *value = if covered > 0.0 { 1.0 } else { 0.0 };
             }
         }
         Self { mask, width, ratio }
@@ -262,18 +285,28 @@ impl DonorGrid {
 
     /// Interpolates the texture linearly on the image grid, with mean 0 and variance 1 over the covered pixels.
     fn sample(&self, texture: &[f32], coverage: &Tile) -> Vec<f32> {
-        let height = texture.len() / self.width;
-        let at = |x: usize, y: usize| texture[y * self.width + x];
-        let mut pixels = if self.ratio == 1.0 { texture.to_vec() } else { Vec::with_capacity(coverage.values.len()) };
-        for place in pixels.len()..coverage.values.len() {
-            let (x, y) = (place % coverage.width, place / coverage.width);
-            let (tx, ty) = (x as f64 * self.ratio, y as f64 * self.ratio);
-            let (x0, y0) = (random::count(tx.floor()).min(self.width - 1), random::count(ty.floor()).min(height - 1));
-            let (x1, y1) = ((x0 + 1).min(self.width - 1), (y0 + 1).min(height - 1));
-            let (fx, fy) = ((tx - x0 as f64) as f32, (ty - y0 as f64) as f32);
-            let upper = at(x0, y0) + fx * (at(x1, y0) - at(x0, y0));
-            let lower = at(x0, y1) + fx * (at(x1, y1) - at(x0, y1));
-            pixels.push(upper + fy * (lower - upper));
+        if self.ratio == 1.0 {
+            let mut pixels = texture.to_vec();
+            standardise(&mut pixels, &coverage.values);
+            return pixels;
+        }
+        let near = |place: usize, count: usize| {
+            let at = place as f64 * self.ratio;
+            let first = random::count(at.floor()).min(count - 1);
+            (first, (first + 1).min(count - 1), (at - first as f64) as f32)
+        };
+        let columns: Vec<(usize, usize, f32)> = (0..coverage.width).map(|x| near(x, self.width)).collect();
+        let mut pixels = vec![0.0; coverage.values.len()];
+        let mut line = vec![0.0; self.width];
+        for (y, row) in pixels.chunks_exact_mut(coverage.width).enumerate() {
+            let (upper, lower, weight) = near(y, texture.len() / self.width);
+            let [upper, lower] = [upper, lower].map(|y| &texture[y * self.width..][..self.width]);
+            for ((value, upper), lower) in line.iter_mut().zip(upper).zip(lower) {
+                *value = upper + weight * (lower - upper);
+            }
+            for (value, &(left, right, weight)) in row.iter_mut().zip(&columns) {
+                *value = line[left] + weight * (line[right] - line[left]);
+            }
         }
         standardise(&mut pixels, &coverage.values);
         pixels
@@ -303,6 +336,48 @@ mod tests {
         assert_eq!(depth[4 * 9 + 4], 1.0);
         assert_eq!(depth[0], 0.0);
         assert_eq!(depth[9 + 4], 0.25);
+    }
+
+    #[test]
+    fn standardised_pixels_have_mean_zero_and_variance_one_inside() {
+        let mut pixels: Vec<f32> = (0..97_u8).map(|i| 40.0 + f32::from(i.wrapping_mul(37) % 23)).collect();
+        let mask: Vec<f32> = (0..97_u8).map(|i| f32::from(i % 5) * 0.25).collect();
+        standardise(&mut pixels, &mask);
+        let inside: Vec<f64> = pixels.iter().zip(&mask).filter(|(_, m)| **m >= 0.5).map(|(p, _)| (*p).into()).collect();
+        let mean = inside.iter().sum::<f64>() / inside.len() as f64;
+        let square = inside.iter().map(|p| p * p).sum::<f64>() / inside.len() as f64;
+        assert!(mean.abs() < 1e-6 && (square - 1.0).abs() < 1e-6, "{mean} {square}");
+        assert!(pixels.iter().zip(&mask).all(|(p, m)| *m > 0.0 || *p == 0.0));
+    }
+
+    #[test]
+    fn a_donor_grid_covers_and_interpolates_the_image() {
+        let disc = |x: f64, y: f64| if (x - 17.0) * (x - 17.0) + (y - 12.0) * (y - 12.0) < 90.0 { 1.0 } else { 0.0 };
+        let place = |i: usize| ((i % 35) as f64, (i / 35) as f64);
+        let values = (0..35 * 25).map(|i| disc(place(i).0, place(i).1)).collect();
+        let coverage = Tile { origin: [0; 2], width: 35, values };
+        for ratio in [0.4, 0.83, 1.0, 1.9] {
+            let grid = DonorGrid::new(&coverage, ratio);
+            // A linear function is interpolated exactly, except for its mean and scale.
+            let linear = |x: f64, y: f64| 2.0 * x - 3.0 * y;
+            let at = |i: usize| linear((i % grid.width) as f64, (i / grid.width) as f64) as f32;
+            let texture: Vec<f32> = (0..grid.mask.len()).map(at).collect();
+            let found = grid.sample(&texture, &coverage);
+            let mut wanted: Vec<f32> =
+                (0..35 * 25).map(|i| linear(ratio * place(i).0, ratio * place(i).1) as f32).collect();
+            standardise(&mut wanted, &coverage.values);
+            for (i, (found, wanted)) in found.iter().zip(&wanted).enumerate() {
+                assert!((found - wanted).abs() < 1e-4, "{ratio} {i}: {found} {wanted}");
+            }
+            if ratio != 1.0 {
+                for (i, mask) in grid.mask.iter().enumerate() {
+                    let [x, y] = [i % grid.width, i / grid.width].map(|c| random::count(c as f64 / ratio));
+                    let near = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
+                    let covered = |(x, y): (usize, usize)| coverage.values[y.min(24) * 35 + x.min(34)] > 0.0;
+                    assert_eq!(*mask > 0.0, near.into_iter().any(covered), "{ratio} {i}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -1,10 +1,12 @@
 //! The nucleus of a cell: outline, chromatin, rim.
 
+use multiversion::multiversion;
 use optics_psf::{Border, Gaussian, Method};
 
 use super::assets::ClassAssets;
 use super::cell_context::CellContext;
 use super::chromatin::standardise;
+use super::noise_fields::{FieldSampler, SIDE, Texels};
 use super::parametric_shape::{perturbed_circle, placed};
 use super::piece::Piece;
 use super::tile::{Point, Tile, area, scaled_about};
@@ -66,8 +68,7 @@ pub(super) fn make(cell: &CellContext<'_>, class: &ClassAssets) -> Result<Piece,
     };
     let imaged = class.donors.imaged && assets.recipe.nucleus.chromatin == Chromatin::Quilt;
     if nucleus.clumping > 0.0 && !imaged {
-        let own = &mut cell.stream("nucleus.clumps");
-        clump(&mut texture, &coverage, nucleus.clumping, pixel_um, own);
+        clump(&mut texture, &coverage, cell);
     }
     let contrast = (nucleus.texture * class.donors.sharpening) as f32;
     // The texture of an imaged donor includes its rim.
@@ -96,13 +97,17 @@ pub(super) fn make(cell: &CellContext<'_>, class: &ClassAssets) -> Result<Piece,
 }
 
 /// Replaces a fraction of the variance of a texture by coarse noise.
-fn clump(texture: &mut [f32], coverage: &Tile, fraction: f64, pixel_um: f64, rng: &mut Stream) {
+fn clump(texture: &mut [f32], coverage: &Tile, cell: &CellContext<'_>) {
     /// Standard deviation of the smoothing of white noise, µm.
     const CLUMP_UM: f64 = 0.7;
-    let smooth = Gaussian::new(CLUMP_UM / pixel_um).expect("pixels are at least 0.01 µm wide");
-    let white: Vec<f32> = coverage.values.iter().map(|_| random::normal(rng) as f32).collect();
-    let mut coarse = smooth.blur(&white, coverage.width, Border::Reflect);
+    let sampler = FieldSampler::clouds(CLUMP_UM / cell.scene.grid().pixel_um, &mut cell.stream("nucleus.clumps"));
+    let mut coarse = vec![0.0; texture.len()];
+    let mut texels: Texels = [0.0; SIDE + 1];
+    for (y, row) in coarse.chunks_exact_mut(coverage.width).enumerate() {
+        cell.noise_fields.clouds().row_into(row, &sampler, [0.0, y as f64], &mut texels);
+    }
     standardise(&mut coarse, &coverage.values);
+    let fraction = cell.body.nucleus.clumping;
     let [fine, rough] = [1.0 - fraction, fraction].map(|part| part.sqrt() as f32);
     texture.iter_mut().zip(&coarse).for_each(|(value, coarse)| *value = fine * *value + rough * coarse);
 }
@@ -120,14 +125,25 @@ fn dome(thickness: &mut Tile, outline: &[Point], nucleus: &NucleusBody) {
     };
     let (xx, xy, yy) = (moment(0, 0), moment(0, 1), moment(1, 1));
     let determinant = (xx * yy - xy * xy).max(f64::MIN_POSITIVE);
-    thickness.for_each(|p, value| {
-        let (dx, dy) = (p[0] - centre[0], p[1] - centre[1]);
-        let rho2 = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / determinant;
-        let chord = (1.0 - rho2).max(0.0).sqrt() / MEAN_CHORD;
-        let slant =
-            (dx * nucleus.thickness_gradient[0] + dy * nucleus.thickness_gradient[1]) / determinant.sqrt().sqrt();
-        *value = ((1.0 - dome + dome * chord) * (1.0 + slant).max(0.0)) as f32;
-    });
+    let squares = [yy, -2.0 * xy, xx].map(|moment| (moment / determinant) as f32);
+    let slants = nucleus.thickness_gradient.map(|slope| (slope / determinant.sqrt().sqrt()) as f32);
+    let weights = [1.0 - dome, dome / MEAN_CHORD].map(|weight| weight as f32);
+    let (width, [x, y]) = (thickness.width, [0, 1].map(|axis| (thickness.origin[axis] as f64 - centre[axis]) as f32));
+    for (row, dy) in thickness.values.chunks_exact_mut(width).zip(0_u16..) {
+        dome_row(row, [x, y + f32::from(dy)], squares, slants, weights);
+    }
+}
+
+/// Computes a row of the thickness; `first` is the position of its first pixel relative to the centre.
+#[multiversion(targets = "simd")]
+fn dome_row(row: &mut [f32], first: [f32; 2], squares: [f32; 3], slants: [f32; 2], weights: [f32; 2]) {
+    let dy = first[1];
+    for (i, value) in row.iter_mut().enumerate() {
+        let dx = first[0] + i as f32;
+        let rho2 = squares[0] * dx * dx + squares[1] * dx * dy + squares[2] * dy * dy;
+        let chord = (1.0 - rho2).max(0.0).sqrt();
+        *value = (weights[0] + weights[1] * chord) * (1.0 + slants[0] * dx + slants[1] * dy).max(0.0);
+    }
 }
 
 /// Radius of a nucleolus, µm: minimum, maximum.

@@ -39,7 +39,7 @@ pub(super) fn make(leukocyte: &Leukocyte, context: &ObjectContext<'_>) -> Phanto
     for (cover, inside) in coverage.values.iter_mut().zip(&nucleus.values) {
         *cover = cover.max(*inside);
     }
-    let area_px = coverage.values.iter().map(|coverage| f64::from(*coverage)).sum();
+    let area_px = coverage.sum();
     Phantom::whole(tile, coverage, area_px, context.dyes.nucleus)
 }
 
