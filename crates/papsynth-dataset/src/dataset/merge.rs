@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
 
+use serde::Deserialize;
 use sha2::{Digest, Sha256};
 
 use super::card::{card, croissant};
@@ -17,7 +18,7 @@ use crate::files::{Check, FileRecord, Folder};
 use crate::formats::parquet::Table;
 use crate::formats::{Format, names};
 use crate::read;
-use crate::truth::{Annotation, Info, Row, Split, typed_columns};
+use crate::truth::{AmodalMask, Image, Info, Row, Split, typed_columns};
 use papsynth::white_level as white;
 
 /// Receives the content of a file in pieces.
@@ -179,6 +180,18 @@ fn tables(folder: &Folder, shards: &[u64], out: &mut Sink) -> Result<(), Error> 
     Ok(())
 }
 
+/// The images of a COCO document.
+#[derive(Deserialize)]
+struct Images {
+    images: Vec<Image>,
+}
+
+/// The complete masks of a COCO document.
+#[derive(Deserialize)]
+struct Masks {
+    annotations: Vec<AmodalMask>,
+}
+
 fn documents(dataset: &Dataset, shards: &[u64], out: &mut Sink) -> Result<(), Error> {
     out(b"{\"info\":")?;
     out(&json(&Info::default()))?;
@@ -187,7 +200,7 @@ fn documents(dataset: &Dataset, shards: &[u64], out: &mut Sink) -> Result<(), Er
     out(b",\"images\":[")?;
     let mut first = true;
     for &shard in shards {
-        for image in dataset.document(shard)?.images {
+        for image in dataset.part_of_document::<Images>(shard)?.images {
             out(if std::mem::take(&mut first) { b"\n" } else { b",\n" })?;
             out(&json(&image))?;
         }
@@ -254,11 +267,11 @@ fn contact_sheet(dataset: &Dataset, shards: &[u64]) -> Result<Vec<u8>, Error> {
             break;
         }
         let record = read_record(folder, shard)?;
-        let document = dataset.document(shard)?;
+        let document: Masks = dataset.part_of_document(shard)?;
         let path = folder.path(&names::coco(shard));
         for frame in record.frames.iter().take(remaining) {
             let image = display_image(dataset, frame, shard)?;
-            let masks = document.annotations.iter().filter(|a| a.image_id == frame.index).map(Annotation::amodal);
+            let masks = document.annotations.iter().filter(|a| a.image_id == frame.index).map(AmodalMask::decode);
             let masks = masks.collect::<Result<Vec<_>, _>>().map_err(Error::input(&path))?;
             sheet.add(&names::numbered(frame.index), &image, white(frame.bits), &masks);
         }

@@ -69,20 +69,21 @@ impl RgbImage {
 
     /// Draws an image, downscaled to `place`, and outlines over it.
     fn draw(&mut self, image: &LevelImage, white: u16, masks: &[(Group, Mask)], place: Place) {
-        let (width, height) = (image.width, image.height());
+        let (width, height, channels) = (image.width, image.height(), image.channels);
         for y in 0..place.height {
             let rows = span(y, place.height, height);
             for x in 0..place.width {
                 let columns = span(x, place.width, width);
-                let count = (rows.len() * columns.len()) as u64;
-                let mean = |channel: usize| {
-                    let row =
-                        |row: usize| columns.clone().map(move |x| u64::from(image.level(x, row, channel))).sum::<u64>();
-                    let sum: u64 = rows.clone().map(row).sum();
-                    let full = count * u64::from(white);
-                    u8::try_from((sum * 255 + full / 2) / full.max(1)).unwrap_or(u8::MAX)
-                };
-                let colour = if image.channels == 3 { [mean(0), mean(1), mean(2)] } else { [mean(0); 3] };
+                let mut sums = [0_u64; 3];
+                for row in rows.clone() {
+                    let row = &image.levels[row * width * channels..];
+                    for pixel in row[columns.start * channels..columns.end * channels].chunks_exact(channels) {
+                        sums.iter_mut().zip(pixel).for_each(|(sum, &level)| *sum += u64::from(level));
+                    }
+                }
+                let full = (rows.len() * columns.len()) as u64 * u64::from(white);
+                let mean = |sum: u64| u8::try_from((sum * 255 + full / 2) / full.max(1)).unwrap_or(u8::MAX);
+                let colour = if channels == 3 { sums.map(mean) } else { [mean(sums[0]); 3] };
                 self.set(place.x + x, place.y + y, colour);
             }
         }

@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex};
 
 use papsynth::truth::Truth;
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 use super::manifest::Manifest;
 use super::record::{Identity, recorded_shards};
@@ -159,6 +160,11 @@ impl Dataset {
     }
 
     pub(super) fn document(&self, shard: u64) -> Result<Document, Error> {
+        self.part_of_document(shard)
+    }
+
+    /// Reads the COCO document of a shard, or the fields of it that `T` has.
+    pub(super) fn part_of_document<T: DeserializeOwned>(&self, shard: u64) -> Result<T, Error> {
         let (folder, name) = (&self.folder, names::coco(shard));
         let path = folder.inside(&name)?;
         let bytes = read::bytes(&path, SHARD_FILE_BYTES)?;

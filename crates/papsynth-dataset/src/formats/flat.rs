@@ -28,8 +28,8 @@ pub(super) fn write(format: Format, field: &Field, files: &mut Files) -> Result<
     for group in GROUPS {
         let [image, masks] = names(format, group, field.frame.index);
         files.encode(&image, image_tiff(&field.training_image(), &field.frame.for_training(), None))?;
-        let ids = files.layout.flatten.labels(field.truth, group);
-        files.encode(&masks, label_tiff(&ids, field.frame))?;
+        let labels = files.layout.flatten.labels(field.truth, group);
+        files.encode(&masks, label_tiff(labels, field.frame))?;
     }
     Ok(())
 }
@@ -38,6 +38,6 @@ pub(super) fn check(format: Format, written: &Written) -> Result<(), Error> {
     GROUPS.into_iter().try_for_each(|group| {
         let [image, masks] = names(format, group, written.field.frame.index);
         written.file(&image, |bytes| written.image(bytes, Depth::Training))?;
-        written.file(&masks, |bytes| written.labels(bytes, &written.flat(group)))
+        written.file(&masks, |bytes| written.labels(bytes, written.flat(group)))
     })
 }

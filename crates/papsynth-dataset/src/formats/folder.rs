@@ -10,8 +10,8 @@ use super::sink::{Field, Files, Sink};
 use super::written::{LIMITS, Written, is_described};
 use crate::error::{Error, InputError};
 use crate::read;
-use crate::truth::FrameSummary;
-use crate::write::{Page, Pages, Pixels, compressed};
+use crate::truth::{Flatten, FrameSummary, overlaps};
+use crate::write::{Pages, Pixels};
 
 #[derive(Default)]
 pub(super) struct Frames {
@@ -42,10 +42,10 @@ pub(super) fn check(written: &Written) -> Result<(), Error> {
     })?;
     for group in Group::ALL {
         let ids = truth.labels(group).ids;
-        written.file(&names::labels(group, index), |bytes| written.labels(bytes, &ids))?;
+        written.file(&names::labels(group, index), |bytes| written.labels(bytes, ids))?;
     }
     let layers: Vec<u32> = truth.layers().into_iter().map(u32::from).collect();
-    written.file(&names::layers(index), |bytes| written.labels(bytes, &layers))
+    written.file(&names::layers(index), |bytes| written.labels(bytes, layers))
 }
 
 impl Sink for Frames {
@@ -81,14 +81,10 @@ impl Sink for Frames {
         if frame.bits > TRAINING_BITS {
             files.png(&names::preview(index), field, Depth::Training)?;
         }
-        let mut ids = Vec::new();
         for group in Group::ALL {
-            field.truth.labels_into(group, &mut ids);
-            files.encode(&names::labels(group, index), label_tiff(&ids, frame))?;
+            files.encode(&names::labels(group, index), label_tiff(Flatten::Top.labels(field.truth, group), frame))?;
         }
-        let layers = &[Pixels::U16(&field.truth.layers())];
-        let layers = compressed(layers, &Page { channels: 1, ..page(frame, None) });
-        files.encode(&names::layers(index), layers)?;
+        files.encode(&names::layers(index), label_tiff(overlaps(field.truth), frame))?;
         if let Some(pages) = self.noise_free.take() {
             files.written.push(pages.commit()?);
         }

@@ -11,8 +11,8 @@ use super::names::numbered;
 use super::sink::{Field, Files, Sink};
 use super::written::{Written, is_described};
 use crate::error::Error;
-use crate::truth::{FrameSummary, layers};
-use crate::write::{Page, PageWriter, Pages, Pixels, compressed, fits_16_bits, is_large, label_pages};
+use crate::truth::{FrameSummary, LabelRuns, layers};
+use crate::write::{Page, PageWriter, Pages, Pixels, compressed, is_large, label_pages};
 
 /// `µm` as ASCII XML, because TIFF descriptions are ASCII.
 const MICROMETRE: &str = "&#181;m";
@@ -61,8 +61,8 @@ fn image(frame: &FrameSummary, name: &str, planes: usize, step: &str, positions:
 }
 
 /// Returns the OME-XML of layers of labels, each a channel.
-pub(super) fn labels_description(frame: &FrameSummary, group: Group, layers: &[Vec<u32>]) -> String {
-    let kind = if layers.iter().all(|layer| fits_16_bits(layer)) { "uint16" } else { "uint32" };
+pub(super) fn labels_description(frame: &FrameSummary, group: Group, layers: &[LabelRuns]) -> String {
+    let kind = if layers.iter().all(LabelRuns::fits_16_bits) { "uint16" } else { "uint32" };
     let layers = layers.len();
     let channels: String = (0..layers)
         .map(|layer| {
@@ -119,7 +119,7 @@ impl<'a> Levels<'a> {
 }
 
 pub(super) fn image_tiff(levels: &[u16], frame: &FrameSummary, text: Option<&str>) -> io::Result<Vec<u8>> {
-    compressed(&[Levels::new(levels, frame).pixels()], &page(frame, text))
+    compressed(Levels::new(levels, frame).pixels(), &page(frame, text))
 }
 
 /// Encodes an image of one plane as OME-TIFF, with a pyramid if it is large.
@@ -136,12 +136,12 @@ pub(super) fn ome_image(levels: &[u16], frame: &FrameSummary) -> io::Result<Vec<
 }
 
 /// Encodes a label image with 16 bits, or 32 if a label needs them.
-pub(super) fn label_tiff(ids: &[u32], frame: &FrameSummary) -> io::Result<Vec<u8>> {
-    label_pages(&[ids], &Page { channels: 1, ..page(frame, None) })
+pub(super) fn label_tiff(labels: LabelRuns, frame: &FrameSummary) -> io::Result<Vec<u8>> {
+    label_pages(&[labels], &Page { channels: 1, ..page(frame, None) })
 }
 
 /// Encodes layers of labels as the channels of an OME-TIFF.
-pub(super) fn ome_labels(layers: &[Vec<u32>], group: Group, frame: &FrameSummary) -> io::Result<Vec<u8>> {
+pub(super) fn ome_labels(layers: &[LabelRuns], group: Group, frame: &FrameSummary) -> io::Result<Vec<u8>> {
     let text = labels_description(frame, group, layers);
     label_pages(layers, &Page { channels: 1, ..page(frame, Some(&text)) })
 }

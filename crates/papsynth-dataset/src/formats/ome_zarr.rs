@@ -20,8 +20,8 @@ use super::written::{LIMITS, Take, Written, is_of_masks};
 use crate::error::{Error, InputError};
 use crate::files::{Folder, Output};
 use crate::read::{self, LevelImage};
-use crate::truth::{FrameSummary, category_name, layers};
-use crate::write::{fits_16_bits, is_large};
+use crate::truth::{FrameSummary, LabelRuns, category_name, layers};
+use crate::write::is_large;
 use papsynth::white_level as white;
 
 /// Width and height of a chunk, the smallest unit that a viewer reads.
@@ -82,8 +82,8 @@ fn label_layers(field: &Field) -> Result<Vec<Layer>, Error> {
     let mut found = Vec::new();
     for group in Group::ALL {
         let pages = layers(field.truth, group);
-        let kind = if pages.iter().all(|ids| fits_16_bits(ids)) { DataType::U16 } else { DataType::U32 };
-        for (number, ids) in pages.into_iter().enumerate() {
+        let kind = if pages.iter().all(LabelRuns::fits_16_bits) { DataType::U16 } else { DataType::U32 };
+        for (number, ids) in pages.iter().map(LabelRuns::pixels).enumerate() {
             let shown: BTreeSet<u32> = ids.iter().copied().filter(|&id| id > 0).collect();
             let labels = Labels {
                 name: format!("{}-{number}", group.name()),

@@ -22,7 +22,7 @@ use crate::bytes::json;
 use crate::error::{Error, InputError};
 use crate::files::{Folder, Handle, Pending};
 use crate::truth::{FrameSummary, Split};
-use crate::write::{PageWriter, fits_16_bits, label_png};
+use crate::write::{PageWriter, label_png};
 
 pub(super) struct Shard {
     tar: tar::Builder<BufWriter<Handle>>,
@@ -174,7 +174,7 @@ pub(super) fn check(written: &Written, tar: &mut Tar) -> Result<(), Error> {
         let group = flat::GROUPS.into_iter().find(|group| group.name() == part);
         let checked = match (part, group) {
             (_, Some(group)) if [".png", ".tif"].iter().any(|end| ending == format!("{part}{end}")) => {
-                written.labels(&bytes, &written.flat(group))
+                written.labels(&bytes, written.flat(group))
             }
             ("json", _) if ending == part => {
                 let found = serde_json::from_slice::<Value>(&bytes).map_err(InputError::from);
@@ -228,10 +228,10 @@ impl Sink for Shard {
             }
         }
         for group in flat::GROUPS {
-            let ids = files.layout.flatten.labels(field.truth, group);
-            let (ending, bytes) = match fits_16_bits(&ids) {
-                true => ("png", label_png(&ids, field.frame.width, field.frame.pixel_um)),
-                false => ("tif", label_tiff(&ids, field.frame)),
+            let labels = files.layout.flatten.labels(field.truth, group);
+            let (ending, bytes) = match labels.fits_16_bits() {
+                true => ("png", label_png(&labels, field.frame.pixel_um)),
+                false => ("tif", label_tiff(labels, field.frame)),
             };
             self.add(&format!("{key}.{}.{ending}", group.name()), &bytes.map_err(failed(&path))?)?;
         }

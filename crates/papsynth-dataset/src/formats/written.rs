@@ -11,6 +11,7 @@ use crate::bytes::sha256;
 use crate::error::{Error, InputError};
 use crate::files::Folder;
 use crate::read::{self, LevelImage, Limits};
+use crate::truth::LabelRuns;
 
 /// Limits on the files of one frame.
 pub(crate) const LIMITS: Limits = Limits {
@@ -111,19 +112,19 @@ impl<'a> Written<'a> {
         Ok(())
     }
 
-    pub(super) fn labels(&self, bytes: &[u8], ids: &[u32]) -> Result<(), InputError> {
+    pub(super) fn labels(&self, bytes: &[u8], ids: Vec<u32>) -> Result<(), InputError> {
         let found = read::label_map(bytes, &LIMITS)?;
         is_of_masks(found.width == self.field.frame.width && found.ids == ids)
     }
 
-    pub(super) fn layers(&self, bytes: &[u8], layers: &[Vec<u32>]) -> Result<(), InputError> {
+    pub(super) fn layers(&self, bytes: &[u8], layers: &[LabelRuns]) -> Result<(), InputError> {
         let found = read::label_pages(bytes, &LIMITS, layers.len().max(1))?;
-        is_of_masks(found.iter().map(|page| &page.ids).eq(layers))
+        is_of_masks(found.into_iter().map(|page| page.ids).eq(layers.iter().map(LabelRuns::pixels)))
     }
 
     /// Returns the labels of a group, one per pixel.
     pub(super) fn flat(&self, group: Group) -> Vec<u32> {
-        self.layout.flatten.labels(self.field.truth, group)
+        self.layout.flatten.labels(self.field.truth, group).pixels()
     }
 }
 

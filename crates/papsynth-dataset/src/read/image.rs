@@ -121,15 +121,11 @@ impl LevelImage {
     pub fn height(&self) -> usize {
         self.levels.len() / (self.width * self.channels).max(1)
     }
-
-    pub(crate) fn level(&self, x: usize, y: usize, channel: usize) -> u16 {
-        self.levels[(y * self.width + x) * self.channels + channel]
-    }
 }
 
 fn levels(samples: Samples) -> Result<(Vec<u16>, u16), InputError> {
     match samples {
-        Samples::U8(samples) => Ok((samples.into_iter().map(u16::from).collect(), u8::MAX.into())),
+        Samples::U8(samples) => Ok((samples.iter().map(|&sample| sample.into()).collect(), u8::MAX.into())),
         Samples::U16(samples) => Ok((samples, u16::MAX)),
         Samples::U32(_) | Samples::F32(_) => Err(InputError::samples("32 bit samples", "8 or 16 bit grey images")),
     }
@@ -159,8 +155,8 @@ pub(crate) fn label_pages(bytes: &[u8], limits: &Limits, most: usize) -> Result<
 fn labels(raster: Raster) -> Result<LabelMap, InputError> {
     let width = raster.width;
     let ids = match raster.grey()? {
-        Samples::U8(samples) => samples.into_iter().map(u32::from).collect(),
-        Samples::U16(samples) => samples.into_iter().map(u32::from).collect(),
+        Samples::U8(samples) => samples.iter().map(|&sample| sample.into()).collect(),
+        Samples::U16(samples) => samples.iter().map(|&sample| sample.into()).collect(),
         Samples::U32(samples) => samples,
         Samples::F32(_) => {
             return Err(InputError::samples("floating-point samples", "8, 16 or 32 bit labels"));

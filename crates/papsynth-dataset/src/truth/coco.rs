@@ -97,7 +97,11 @@ pub(crate) struct Annotation {
 
 impl Annotation {
     fn new(id: u64, parent_id: Option<u64>, object: &ObjectTruth, frame: &FrameSummary, category_id: u32) -> Self {
-        let (width, height) = (frame.width, frame.height);
+        let segmentation = Rle::new(&object.amodal, frame.width, frame.height);
+        let visible = match object.visible == object.amodal {
+            true => segmentation.clone(),
+            false => Rle::new(&object.visible, frame.width, frame.height),
+        };
         Self {
             id,
             image_id: frame.index,
@@ -105,8 +109,8 @@ impl Annotation {
             bbox: box_of(&object.amodal),
             area: object.amodal.area(),
             iscrowd: 0,
-            segmentation: Rle::new(&object.amodal, width, height),
-            visible: Rle::new(&object.visible, width, height),
+            segmentation,
+            visible,
             visible_area: object.visible.area(),
             object_id: object.id,
             parent_id,
@@ -133,11 +137,6 @@ impl Annotation {
     pub(crate) fn renumbered(self, offset: u64) -> Self {
         let parent_id = self.parent_id.map(|parent| parent.saturating_add(offset));
         Self { id: self.id.saturating_add(offset), parent_id, ..self }
-    }
-
-    /// Returns the group and the complete mask.
-    pub(crate) fn amodal(&self) -> Result<(Group, Mask), InputError> {
-        Ok((group(self.part), self.segmentation.mask()?))
     }
 
     /// Returns the ground truth of the object.
@@ -187,6 +186,21 @@ impl Annotation {
             defocus_um: self.defocus_um.clone(),
             detectability: self.detectability.clone(),
         })
+    }
+}
+
+/// The complete (amodal) mask of an annotation.
+#[derive(Deserialize)]
+pub(crate) struct AmodalMask {
+    pub(crate) image_id: u64,
+    part: Part,
+    segmentation: Rle,
+}
+
+impl AmodalMask {
+    /// Returns the group and the mask.
+    pub(crate) fn decode(&self) -> Result<(Group, Mask), InputError> {
+        Ok((group(self.part), self.segmentation.mask()?))
     }
 }
 

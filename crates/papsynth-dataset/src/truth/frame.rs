@@ -8,7 +8,7 @@ use papsynth::truth::{Group, Mask, Part, Truth};
 use papsynth::white_level;
 use serde::{Deserialize, Serialize};
 
-use super::labels::Flatten;
+use super::labels::{Flatten, overlaps};
 use crate::error::Error;
 use crate::formats::TRAINING_BITS;
 
@@ -103,7 +103,7 @@ impl FrameSummary {
             clipped_px,
             objects,
             truncated: truth.objects.iter().filter(|o| o.truncated).count() as u64,
-            max_overlap: truth.layers().into_iter().max().unwrap_or(0),
+            max_overlap: u16::try_from(overlaps(truth).largest()).unwrap_or(u16::MAX),
             occluded_px: Group::ALL.map(|group| (group.name().to_owned(), flatten.occluded(truth, group))).into(),
             ..self
         }

@@ -1,6 +1,6 @@
-//! Label images: with one label per pixel, and in layers with all masks complete.
+//! Label images as runs: with one label per pixel, and in layers with all masks complete.
 
-use papsynth::truth::{Group, Truth};
+use papsynth::truth::{Group, Mask, ObjectTruth, Truth};
 use serde::{Deserialize, Serialize};
 
 /// The label of a pixel where objects of a group overlap, in formats with one label per pixel.
@@ -37,63 +37,155 @@ impl Flatten {
         let shown = match self {
             // One object per pixel: the counts of both policies are equal.
             Self::Top | Self::Max => of_group().map(|object| object.visible.area()).sum(),
-            Self::Drop => self.labels(truth, group).iter().filter(|&&id| id > 0).count() as u64,
+            Self::Drop => self.labels(truth, group).labelled() as u64,
         };
         all - shown
     }
 
-    /// Returns the labels of a group in row-major order.
-    pub(crate) fn labels(self, truth: &Truth, group: Group) -> Vec<u32> {
-        let mut ids = Vec::new();
-        let mut objects: Vec<_> = truth.objects.iter().filter(|object| object.group() == group).collect();
-        objects.sort_by_key(|object| object.id);
+    /// Returns the labels of a group.
+    pub(crate) fn labels(self, truth: &Truth, group: Group) -> LabelRuns {
+        let of_group = || truth.objects.iter().filter(|object| object.group() == group);
+        let complete = of_group().map(|object| (object.id, &object.amodal));
+        let size = [truth.width, truth.height];
         match self {
-            Self::Top => truth.labels_into(group, &mut ids),
-            Self::Max => {
-                ids.resize(truth.width * truth.height, 0);
-                for object in &objects {
-                    object.amodal.pixels(truth.width).for_each(|pixel| ids[pixel] = object.id);
-                }
-            }
-            Self::Drop => {
-                ids.resize(truth.width * truth.height, 0);
-                let mut shared = Vec::new();
-                for object in &objects {
-                    for pixel in object.amodal.pixels(truth.width) {
-                        if ids[pixel] == 0 {
-                            ids[pixel] = object.id;
-                        } else {
-                            shared.push(pixel);
-                        }
-                    }
-                }
-                shared.into_iter().for_each(|pixel| ids[pixel] = 0);
-            }
+            Self::Top => LabelRuns::new(of_group().map(|object| (object.id, &object.visible)), size, first),
+            Self::Max => LabelRuns::new(complete, size, |ids| ids.iter().copied().max().unwrap_or(0)),
+            Self::Drop => LabelRuns::new(complete, size, |ids| if let [id] = *ids { id } else { 0 }),
         }
-        ids
     }
 }
 
-/// Returns the labels of a group in layers, at least one, each in row-major order. Objects of a layer do not overlap,
-/// so their masks are complete. Each object goes into the first layer with room for it, in the order of ids.
-pub(crate) fn layers(truth: &Truth, group: Group) -> Vec<Vec<u32>> {
-    let empty = || vec![0_u32; truth.width * truth.height];
-    let mut layers = vec![empty()];
+fn first(ids: &[u32]) -> u32 {
+    ids.first().copied().unwrap_or(0)
+}
+
+/// Returns the number of overlapping cytoplasms at each pixel.
+pub(crate) fn overlaps(truth: &Truth) -> LabelRuns {
+    let cytoplasms = truth.objects.iter().filter(|object| object.group() == Group::Cytoplasm);
+    let count = |ids: &[u32]| u32::try_from(ids.len()).unwrap_or(u32::MAX);
+    LabelRuns::new(cytoplasms.map(|object| (object.id, &object.amodal)), [truth.width, truth.height], count)
+}
+
+/// Returns the labels of a group in layers, at least one. Objects of a layer do not overlap, so their masks are
+/// complete. Each object goes into the first layer with room for it, in the order of ids.
+pub(crate) fn layers(truth: &Truth, group: Group) -> Vec<LabelRuns> {
+    let mut layers: Vec<Vec<&ObjectTruth>> = vec![Vec::new()];
     for object in truth.objects.iter().filter(|object| object.group() == group) {
-        let is_free = |layer: &Vec<u32>| object.amodal.pixels(truth.width).all(|pixel| layer[pixel] == 0);
-        let free = layers.iter().position(is_free).unwrap_or_else(|| {
-            layers.push(empty());
-            layers.len() - 1
-        });
-        object.amodal.pixels(truth.width).for_each(|pixel| layers[free][pixel] = object.id);
+        let is_free = |layer: &Vec<&ObjectTruth>| !layer.iter().any(|other| overlap(&other.amodal, &object.amodal));
+        match layers.iter().position(is_free) {
+            Some(free) => layers[free].push(object),
+            None => layers.push(vec![object]),
+        }
     }
-    layers
+    let labels = |layer: Vec<&ObjectTruth>| {
+        let masks = layer.into_iter().map(|object| (object.id, &object.amodal));
+        LabelRuns::new(masks, [truth.width, truth.height], first)
+    };
+    layers.into_iter().map(labels).collect()
+}
+
+/// Whether two masks have a common pixel.
+fn overlap(one: &Mask, other: &Mask) -> bool {
+    let (mut one, mut other) = (one.runs(), other.runs());
+    while let ([a, rest_of_one @ ..], [b, rest_of_other @ ..]) = (one, other) {
+        if a.y == b.y && a.x0 < b.x1 && b.x0 < a.x1 {
+            return true;
+        }
+        if (a.y, a.x1) < (b.y, b.x1) { one = rest_of_one } else { other = rest_of_other }
+    }
+    false
+}
+
+/// A label image as runs of equal labels.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct LabelRuns {
+    /// Columns.
+    pub(crate) width: usize,
+    /// Rows.
+    pub(crate) height: usize,
+    /// Labels and numbers of pixels, in row-major order. The labels of consecutive runs differ.
+    runs: Vec<(u32, usize)>,
+}
+
+impl LabelRuns {
+    /// Returns the image of masks with ids. `label` returns the label of pixels from the ids of the masks that cover
+    /// them, in any order.
+    fn new<'m>(
+        masks: impl Iterator<Item = (u32, &'m Mask)>,
+        [width, height]: [usize; 2],
+        label: impl Fn(&[u32]) -> u32,
+    ) -> Self {
+        // Pixels at which a run of a mask begins, or has ended, in row-major order.
+        let mut edges: Vec<(usize, u32, bool)> = Vec::new();
+        for (id, mask) in masks {
+            for run in mask.runs() {
+                let at = |x: u32| run.y as usize * width + x as usize;
+                edges.extend([(at(run.x0), id, true), (at(run.x1), id, false)]);
+            }
+        }
+        edges.sort_by_key(|edge| edge.0);
+        let (mut runs, mut ids, mut from): (Vec<(u32, usize)>, Vec<u32>, usize) = (Vec::new(), Vec::new(), 0);
+        for (at, id, begins) in edges.into_iter().chain([(width * height, 0, true)]) {
+            if at > from {
+                match (runs.last_mut(), label(&ids)) {
+                    (Some((last, count)), label) if *last == label => *count += at - from,
+                    (_, label) => runs.push((label, at - from)),
+                }
+                from = at;
+            }
+            if begins {
+                ids.push(id);
+            } else if let Some(ended) = ids.iter().position(|other| *other == id) {
+                ids.swap_remove(ended);
+            }
+        }
+        Self { width, height, runs }
+    }
+
+    pub(crate) fn fits_16_bits(&self) -> bool {
+        self.largest() <= u16::MAX.into()
+    }
+
+    /// Returns the largest label.
+    pub(crate) fn largest(&self) -> u32 {
+        self.runs.iter().map(|(label, _)| *label).max().unwrap_or(0)
+    }
+
+    /// Returns the number of pixels with a label.
+    fn labelled(&self) -> usize {
+        self.runs.iter().filter(|(label, _)| *label > 0).map(|(_, count)| count).sum()
+    }
+
+    /// Returns the label of each pixel, in row-major order.
+    pub(crate) fn pixels(&self) -> Vec<u32> {
+        let mut pixels = Vec::with_capacity(self.width * self.height);
+        for &(label, count) in &self.runs {
+            pixels.resize(pixels.len() + count, label);
+        }
+        pixels
+    }
+
+    /// Splits the runs into parts of a number of pixels; the last part may have fewer.
+    pub(crate) fn parts(&self, pixels: usize) -> Vec<Vec<(u32, usize)>> {
+        let (mut parts, mut part, mut room) = (Vec::new(), Vec::new(), pixels);
+        for &(label, mut count) in &self.runs {
+            while count > 0 {
+                let taken = count.min(room);
+                part.push((label, taken));
+                (count, room) = (count - taken, room - taken);
+                if room == 0 {
+                    parts.push(std::mem::take(&mut part));
+                    room = pixels;
+                }
+            }
+        }
+        parts.extend((!part.is_empty()).then_some(part));
+        parts
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use papsynth::truth::Mask;
-
     use super::*;
     use crate::support::{HEIGHT, WIDTH, frame};
 
@@ -117,7 +209,7 @@ mod tests {
     fn policies_equal_the_slow_version_and_count_occluded_pixels() {
         let truth = frame(0, 1, 8, 1).finished.truth;
         for (policy, group) in Flatten::ALL.into_iter().flat_map(|p| Group::ALL.map(|g| (p, g))) {
-            let (ids, occluded) = (policy.labels(&truth, group), policy.occluded(&truth, group));
+            let (ids, occluded) = (policy.labels(&truth, group).pixels(), policy.occluded(&truth, group));
             assert_eq!(ids, slow(policy, &truth, group), "{policy:?} {group:?}");
             let masks: u64 = truth.objects.iter().filter(|o| o.group() == group).map(|o| o.amodal.area()).sum();
             assert_eq!(occluded, masks - ids.iter().filter(|&&id| id > 0).count() as u64);
@@ -130,7 +222,7 @@ mod tests {
     fn every_mask_is_complete_in_one_layer() {
         let truth = frame(0, 1, 8, 1).finished.truth;
         for (group, count) in [(Group::Cytoplasm, 2), (Group::Nucleus, 1), (Group::Debris, 1)] {
-            let layers = layers(&truth, group);
+            let layers: Vec<Vec<u32>> = layers(&truth, group).iter().map(LabelRuns::pixels).collect();
             assert_eq!(layers.len(), count, "{group:?}");
             for object in truth.objects.iter().filter(|object| object.group() == group) {
                 let shown: Vec<Vec<usize>> = layers
@@ -141,6 +233,39 @@ mod tests {
                 assert_eq!(shown.iter().filter(|pixels| **pixels == whole).count(), 1);
                 assert_eq!(shown.iter().filter(|pixels| pixels.is_empty()).count(), layers.len() - 1);
             }
+        }
+    }
+
+    #[test]
+    fn overlaps_are_counted_and_parts_are_the_whole() {
+        let truth = frame(0, 1, 8, 1).finished.truth;
+        let overlaps = overlaps(&truth);
+        assert_eq!(overlaps.pixels(), truth.layers().into_iter().map(u32::from).collect::<Vec<_>>());
+        assert_eq!(overlaps.largest(), 2);
+        for pixels in [1, 7, WIDTH, 3 * WIDTH, 2 * WIDTH * HEIGHT] {
+            let parts = overlaps.parts(pixels);
+            let sizes: Vec<usize> = parts.iter().map(|part| part.iter().map(|run| run.1).sum()).collect();
+            assert!(sizes[..sizes.len() - 1].iter().all(|&size| size == pixels), "{pixels}: {sizes:?}");
+            let all = parts.concat().into_iter().flat_map(|(label, count)| vec![label; count]);
+            assert!(all.eq(overlaps.pixels()), "{pixels}");
+        }
+    }
+
+    #[test]
+    fn masks_overlap_if_they_share_a_pixel() {
+        use papsynth::truth::Run;
+        let mask = |runs: &[(u32, u32, u32)]| {
+            Mask::from_runs(runs.iter().map(|&(y, x0, x1)| Run { y, x0, x1 }).collect::<Vec<_>>())
+        };
+        let one = mask(&[(1, 2, 4), (1, 6, 9), (3, 0, 5)]);
+        for (other, expected) in [
+            (mask(&[]), false),
+            (mask(&[(1, 0, 2), (1, 4, 6), (1, 9, 12), (2, 0, 20), (3, 5, 6)]), false),
+            (mask(&[(0, 0, 20), (1, 8, 20)]), true),
+            (mask(&[(1, 0, 2), (3, 4, 5)]), true),
+            (one.clone(), true),
+        ] {
+            assert_eq!([overlap(&one, &other), overlap(&other, &one)], [expected; 2], "{other:?}");
         }
     }
 }

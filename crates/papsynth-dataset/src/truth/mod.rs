@@ -9,13 +9,13 @@ mod splits;
 mod table;
 
 pub use coco::truths;
-pub(crate) use coco::{Annotation, Document, Image, Info, extends_beyond};
+pub(crate) use coco::{AmodalMask, Document, Image, Info, extends_beyond};
 pub(crate) use frame::categories;
 #[cfg(feature = "zarr")]
 pub(crate) use frame::category_name;
 pub use frame::{Category, FrameSummary};
 pub use labels::Flatten;
-pub(crate) use labels::layers;
+pub(crate) use labels::{LabelRuns, layers, overlaps};
 pub(crate) use polygon::{collection, outlines};
 pub(crate) use splits::Split;
 #[cfg(feature = "parquet")]

@@ -37,16 +37,6 @@ pub(crate) fn encode_in_box(mask: &Mask) -> String {
 /// Returns the numbers of pixels outside, inside, outside, … in column-major order. A last count of 0 is left out, a
 /// first one is not.
 fn counts(mask: &Mask, width: usize, height: usize) -> Vec<i64> {
-    // Rows `start..end` of each column, extended row by row.
-    let mut columns: Vec<Vec<[u32; 2]>> = vec![Vec::new(); width];
-    for run in mask.runs() {
-        for column in &mut columns[run.x0 as usize..run.x1 as usize] {
-            match column.last_mut() {
-                Some(last) if last[1] == run.y => last[1] += 1,
-                _ => column.push([run.y, run.y + 1]),
-            }
-        }
-    }
     let mut counts = Vec::new();
     let mut inside: Option<[u64; 2]> = None;
     let mut end = 0;
@@ -54,16 +44,14 @@ fn counts(mask: &Mask, width: usize, height: usize) -> Vec<i64> {
         counts.extend([(from - end) as i64, (to - from) as i64]);
         end = to;
     };
-    for (x, column) in columns.iter().enumerate() {
-        for row in column {
-            let [from, to] = row.map(|y| (x * height) as u64 + u64::from(y));
-            match &mut inside {
-                // The end of a column and the start of the next are neighbours.
-                Some(last) if last[1] == from => last[1] = to,
-                _ => {
-                    if let Some(last) = inside.replace([from, to]) {
-                        close(last);
-                    }
+    for column in transposed(mask.runs()) {
+        let [from, to] = [column.x0, column.x1].map(|y| u64::from(column.y) * height as u64 + u64::from(y));
+        match &mut inside {
+            // The end of a column and the start of the next are neighbours.
+            Some(last) if last[1] == from => last[1] = to,
+            _ => {
+                if let Some(last) = inside.replace([from, to]) {
+                    close(last);
                 }
             }
         }
@@ -76,6 +64,37 @@ fn counts(mask: &Mask, width: usize, height: usize) -> Vec<i64> {
         counts.push((total - end) as i64);
     }
     counts
+}
+
+/// Returns the runs of the same pixels with rows and columns exchanged. The time is proportional to the length of the
+/// outline, not to the area.
+fn transposed(runs: &[Run]) -> Vec<Run> {
+    // Columns and rows at which a run of a column begins, or has ended, as numbers for fast sorting.
+    let mut edges: Vec<u64> = Vec::new();
+    let mut ends = Vec::new();
+    let mut add = |above: &[Run], here: &[Run], y: u32| {
+        ends.clear();
+        ends.extend(above.iter().chain(here).flat_map(|run| [run.x0, run.x1]));
+        ends.sort_unstable();
+        // Sorted in pairs, the ends are the columns that are in one of the rows, but not in both.
+        edges.extend(ends.chunks_exact(2).flat_map(|pair| pair[0]..pair[1]).map(|x| u64::from(x) << 32 | u64::from(y)));
+    };
+    let mut above: &[Run] = &[];
+    for here in runs.chunk_by(|a, b| a.y == b.y).chain([&[][..]]) {
+        let below = above.first().map_or(0, |run| run.y + 1);
+        match here.first() {
+            Some(run) if run.y == below => add(above, here, below),
+            first => {
+                add(above, &[], below);
+                add(&[], here, first.map_or(0, |run| run.y));
+            }
+        }
+        above = here;
+    }
+    edges.sort_unstable();
+    #[expect(clippy::cast_possible_truncation, reason = "the lower half is a row")]
+    let row = |edge: u64| edge as u32;
+    edges.chunks_exact(2).map(|pair| Run { y: (pair[0] >> 32) as u32, x0: row(pair[0]), x1: row(pair[1]) }).collect()
 }
 
 /// Encodes a number with five bits per character, lowest first. The sixth bit is set if more follow; the fifth bit of
@@ -103,7 +122,7 @@ pub fn decode(counts: &str, width: usize, height: usize) -> Result<Mask, InputEr
         return Err(wrong(format!("the image is {width} x {height} pixels; expected at most {MAX_SIDE} per side")));
     }
     let total = width * height;
-    let mut rows: Vec<Vec<[u32; 2]>> = vec![Vec::new(); height];
+    let mut columns = Vec::new();
     let mut last_two = [0_i64; 2];
     let (mut position, mut number) = (0_usize, 0_usize);
     let mut bytes = counts.bytes();
@@ -115,22 +134,24 @@ pub fn decode(counts: &str, width: usize, height: usize) -> Result<Mask, InputEr
         if end > total {
             return Err(wrong(format!("the counts exceed the {total} pixels of the image")));
         }
-        if number % 2 == 1 {
-            for pixel in position..end {
-                let x = u32::try_from(pixel / height).unwrap_or(u32::MAX);
-                match rows[pixel % height].last_mut() {
-                    Some(run) if run[1] == x => run[1] += 1,
-                    _ => rows[pixel % height].push([x, x + 1]),
-                }
-            }
+        let mut from = position;
+        while number % 2 == 1 && from < end {
+            let (column, to) = (from / height, end.min((from / height + 1) * height));
+            let [y, x0, x1] = [column, from - column * height, to - column * height].map(to_u32);
+            columns.push(Run { y, x0, x1 });
+            from = to;
         }
         (position, number) = (end, number + 1);
     }
     if position != total {
         return Err(wrong(format!("the counts fill {position} of {total} pixels")));
     }
-    let runs = (0_u32..).zip(rows).flat_map(|(y, row)| row.into_iter().map(move |[x0, x1]| Run { y, x0, x1 }));
-    Ok(Mask::from_runs(runs.collect()))
+    Ok(Mask::from_runs(transposed(&columns)))
+}
+
+/// Converts a row or column of an image.
+fn to_u32(position: usize) -> u32 {
+    u32::try_from(position).unwrap_or(u32::MAX)
 }
 
 fn pull(bytes: &mut std::str::Bytes) -> Result<Option<i64>, &'static str> {

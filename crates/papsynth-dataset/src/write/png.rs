@@ -4,6 +4,8 @@ use std::io;
 
 use png::{BitDepth, ColorType, Compression, Encoder, Filter, PixelDimensions, Unit};
 
+use crate::truth::LabelRuns;
+
 /// Encodes a grey or colour image with 8 bits, or 16 if `bits` is above 8. `pixel_um` is written as physical size
 /// (`pHYs`).
 pub(crate) fn png(levels: &[u16], width: usize, channels: usize, bits: u32, pixel_um: f64) -> io::Result<Vec<u8>> {
@@ -28,10 +30,10 @@ pub(crate) fn png(levels: &[u16], width: usize, channels: usize, bits: u32, pixe
 }
 
 /// Encodes labels with 16 bits.
-pub(crate) fn label_png(ids: &[u32], width: usize, pixel_um: f64) -> io::Result<Vec<u8>> {
+pub(crate) fn label_png(labels: &LabelRuns, pixel_um: f64) -> io::Result<Vec<u8>> {
     let levels: Vec<u16> =
-        ids.iter().map(|&id| u16::try_from(id)).collect::<Result<_, _>>().map_err(io::Error::other)?;
-    png(&levels, width, 1, 16, pixel_um)
+        labels.pixels().into_iter().map(u16::try_from).collect::<Result<_, _>>().map_err(io::Error::other)?;
+    png(&levels, labels.width, 1, 16, pixel_um)
 }
 
 /// Encodes a colour image with three bytes per pixel.
@@ -40,7 +42,7 @@ pub(crate) fn rgb_png(rgb: &[u8], width: usize) -> io::Result<Vec<u8>> {
     let mut encoder = Encoder::new(&mut out, side(width)?, side(rgb.len() / (3 * width.max(1)))?);
     encoder.set_color(ColorType::Rgb);
     encoder.set_depth(BitDepth::Eight);
-    encoder.set_compression(Compression::Balanced);
+    encoder.set_compression(Compression::Fast);
     write(encoder, rgb)?;
     Ok(out)
 }

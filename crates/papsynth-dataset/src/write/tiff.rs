@@ -10,8 +10,10 @@ use tiff::encoder::{DirectoryEncoder, Rational, TiffEncoder, TiffKind, TiffKindB
 use tiff::tags::{CompressionMethod, PhotometricInterpretation, Predictor, ResolutionUnit, SampleFormat, Tag};
 use tiff::{TiffError, TiffResult};
 
+use super::deflate::compressed_runs;
 use crate::error::Error;
 use crate::files::{FileRecord, Pending};
+use crate::truth::LabelRuns;
 
 pub(crate) trait Out: Write + Seek {}
 
@@ -33,7 +35,6 @@ pub(crate) struct Page<'a> {
 pub(crate) enum Pixels<'a> {
     U8(&'a [u8]),
     U16(&'a [u16]),
-    U32(&'a [u32]),
     F32(&'a [f32]),
 }
 
@@ -42,7 +43,6 @@ impl<'a> Pixels<'a> {
         match self {
             Self::U8(data) => data.len(),
             Self::U16(data) => data.len(),
-            Self::U32(data) => data.len(),
             Self::F32(data) => data.len(),
         }
     }
@@ -52,7 +52,6 @@ impl<'a> Pixels<'a> {
         match self {
             Self::U8(_) => (8, SampleFormat::Uint),
             Self::U16(_) => (16, SampleFormat::Uint),
-            Self::U32(_) => (32, SampleFormat::Uint),
             Self::F32(_) => (32, SampleFormat::IEEEFP),
         }
     }
@@ -62,7 +61,6 @@ impl<'a> Pixels<'a> {
         match self {
             Self::U8(data) => data[range].data(),
             Self::U16(data) => data[range].data(),
-            Self::U32(data) => data[range].data(),
             Self::F32(data) => data[range].data(),
         }
     }
@@ -157,30 +155,70 @@ impl Pages {
 }
 
 /// Encodes label images as pages: all with 16 bits, or all with 32 if a label needs them.
-pub(crate) fn label_pages<I: AsRef<[u32]>>(pages: &[I], page: &Page) -> io::Result<Vec<u8>> {
-    if !pages.iter().all(|ids| fits_16_bits(ids.as_ref())) {
-        let pages: Vec<Pixels> = pages.iter().map(|ids| Pixels::U32(ids.as_ref())).collect();
-        return compressed(&pages, page);
+pub(crate) fn label_pages(pages: &[LabelRuns], page: &Page) -> io::Result<Vec<u8>> {
+    let is_narrow = pages.iter().all(LabelRuns::fits_16_bits);
+    compressed_pages(pages.iter().map(|labels| Strips::of_labels(labels, is_narrow)), page)
+}
+
+/// Encodes an image as a compressed page of integers.
+pub(crate) fn compressed(pixels: Pixels, page: &Page) -> io::Result<Vec<u8>> {
+    compressed_pages([Strips::of_pixels(pixels, page)].into_iter(), page)
+}
+
+/// Compression level of images. Higher levels hardly make them smaller.
+const FASTEST: u8 = 1;
+
+/// Size of an uncompressed strip of compressed pages, bytes.
+const STRIP_BYTES: usize = 1 << 18;
+
+/// The pixels of a page as compressed strips, without the horizontal predictor, which ImageJ ignores.
+struct Strips {
+    compressed: Vec<Vec<u8>>,
+    /// Rows of the page, and of a strip.
+    rows: [usize; 2],
+    bits: u16,
+    format: SampleFormat,
+}
+
+impl Strips {
+    fn of_pixels(pixels: Pixels, page: &Page) -> Self {
+        let row = (page.width * page.channels).max(1);
+        let (bits, format) = pixels.sample();
+        let rows = Self::rows(row, bits);
+        let strips = (0..pixels.len()).step_by(rows * row);
+        let strip = |from| pixels.bytes(from..pixels.len().min(from + rows * row));
+        let compressed = strips.map(|from| compress_to_vec_zlib(&strip(from), FASTEST)).collect();
+        Self { compressed, rows: [pixels.len() / row, rows], bits, format }
     }
-    #[expect(clippy::cast_possible_truncation, reason = "the values fit into 16 bits")]
-    let narrow: Vec<Vec<u16>> = pages.iter().map(|ids| ids.as_ref().iter().map(|&id| id as u16).collect()).collect();
-    let pages: Vec<Pixels> = narrow.iter().map(|ids| Pixels::U16(ids)).collect();
-    compressed(&pages, page)
+
+    /// Compresses a label image with 16 bits if `is_narrow`, else with 32.
+    fn of_labels(labels: &LabelRuns, is_narrow: bool) -> Self {
+        let bits = if is_narrow { 16 } else { 32 };
+        let rows = Self::rows(labels.width, bits);
+        #[expect(clippy::cast_possible_truncation, reason = "the labels fit into 16 bits")]
+        let narrow = |(label, count): (u32, usize)| ((label as u16).to_ne_bytes(), count);
+        let compress = |runs: Vec<(u32, usize)>| match is_narrow {
+            true => compressed_runs(runs.into_iter().map(narrow)),
+            false => compressed_runs(runs.into_iter().map(|(label, count)| (label.to_ne_bytes(), count))),
+        };
+        let compressed = labels.parts(rows * labels.width).into_iter().map(compress).collect();
+        Self { compressed, rows: [labels.height, rows], bits, format: SampleFormat::Uint }
+    }
+
+    /// Returns the rows of a strip.
+    fn rows(row: usize, bits: u16) -> usize {
+        (STRIP_BYTES / (row * usize::from(bits / 8))).max(1)
+    }
 }
 
-pub(crate) fn fits_16_bits(ids: &[u32]) -> bool {
-    ids.iter().all(|&id| id <= u16::MAX.into())
-}
-
-/// Encodes compressed pages of integers, without the horizontal predictor, which ImageJ ignores. The first page has the
-/// description.
-pub(crate) fn compressed(pages: &[Pixels], page: &Page) -> io::Result<Vec<u8>> {
+/// Encodes compressed pages. The first one has the description.
+fn compressed_pages(pages: impl Iterator<Item = Strips>, page: &Page) -> io::Result<Vec<u8>> {
     let mut out = Cursor::new(Vec::new());
-    let mut write = || -> TiffResult<()> {
+    let write = || -> TiffResult<()> {
         let mut encoder = TiffEncoder::new(Box::new(&mut out) as Box<dyn Out>)?;
-        for (number, &pixels) in pages.iter().enumerate() {
+        for (number, strips) in pages.enumerate() {
             let text = page.text.filter(|_| number == 0);
-            compressed_page(&mut encoder, pixels, &Page { text, ..*page })?;
+            compressed_page(&mut encoder, &strips, &Page { text, ..*page })?;
         }
         Ok(())
     };
@@ -188,24 +226,14 @@ pub(crate) fn compressed(pages: &[Pixels], page: &Page) -> io::Result<Vec<u8>> {
     Ok(out.into_inner())
 }
 
-/// Compression level. Label images hardly become smaller at higher levels.
-const FASTEST: u8 = 1;
-
-/// Size of an uncompressed strip of compressed pages, bytes.
-const STRIP_BYTES: usize = 1 << 18;
-
 fn compressed_page(
     encoder: &mut TiffEncoder<Box<dyn Out + '_>, TiffKindStandard>,
-    pixels: Pixels,
+    &Strips { ref compressed, rows: [height, rows], bits, format }: &Strips,
     page: &Page,
 ) -> TiffResult<()> {
-    let row = (page.width * page.channels).max(1);
-    let (bits, format) = pixels.sample();
-    let rows = (STRIP_BYTES / (row * usize::from(bits / 8))).max(1);
     let mut directory = encoder.image_directory()?;
     let (mut offsets, mut sizes) = (Vec::new(), Vec::new());
-    for from in (0..pixels.len()).step_by(rows * row) {
-        let strip = compress_to_vec_zlib(&pixels.bytes(from..pixels.len().min(from + rows * row)), FASTEST);
+    for strip in compressed {
         offsets.push(u32::try_from(directory.write_data(strip.as_slice())?)?);
         sizes.push(u32::try_from(strip.len())?);
     }
@@ -217,7 +245,7 @@ fn compressed_page(
     directory.write_tag(Tag::StripByteCounts, sizes.as_slice())?;
     directory.write_tag(Tag::SampleFormat, vec![format.to_u16(); page.channels].as_slice())?;
     resolution(&mut directory, page.pixel_um)?;
-    head(&mut directory, pixels.len() / row, rows, CompressionMethod::Deflate, page)?;
+    head(&mut directory, height, rows, CompressionMethod::Deflate, page)?;
     directory.finish()
 }
 
