@@ -143,9 +143,13 @@ fn verify_in(
     let is_closed = closed >= recorded.len() as u64 && !merged.is_empty();
     if inputs_match && !is_damaged && is_closed {
         let found: BTreeSet<String> = findings.iter().map(|finding| finding.path.clone()).collect();
-        for finding in merged_findings(&dataset, &writer, &merged)? {
+        let expected = expected_files(&dataset, &writer, &merged)?;
+        for finding in merged_findings(&expected, &merged) {
             listed.insert(finding.path.clone());
             findings.extend((!found.contains(&finding.path)).then_some(finding));
+        }
+        if manifest_sha256(&dataset, &writer, &expected)? != manifest.sha256 {
+            findings.push(Finding::damaged(names::MANIFEST, "its list of files differs from the shards"));
         }
     }
     if !is_closed {
@@ -154,9 +158,6 @@ fn verify_in(
             false => format!("merged shards: {closed} of {}", recorded.len()),
         };
         findings.push(Finding { path: names::MANIFEST.to_owned(), message, fix: Fix::Merge });
-    }
-    if findings.is_empty() && manifest_sha256(&dataset, &writer, &merged)? != manifest.sha256 {
-        findings.push(Finding::damaged(names::MANIFEST, "its list of files differs from the records of the shards"));
     }
     let files = listed.len() as u64;
     let is_known = |path: &String| {
@@ -268,18 +269,27 @@ fn named_map(folder: &Folder) -> Option<String> {
     map_of(&Recipe::from_toml(&String::from_utf8_lossy(&text)).ok()?).cloned()
 }
 
-/// Returns the merged files that differ from those computed from the shards.
-fn merged_findings(dataset: &Dataset, writer: &str, merged: &[FileRecord]) -> Result<Vec<Finding>, Error> {
+/// Returns the records of the merged files, computed from the shards. Texts and compressed bytes depend on the release
+/// that wrote them, so those of another release are as listed in the manifest.
+fn expected_files(dataset: &Dataset, writer: &str, merged: &[FileRecord]) -> Result<Vec<FileRecord>, Error> {
+    const OF_RELEASE: [&str; 5] =
+        [names::CARD, names::CROISSANT, names::SHEET, names::OBJECTS, names::HUGGINGFACE_CARD];
     let given: Vec<&str> = dataset.given().collect();
     let given = merged.iter().filter(|file| given.contains(&file.path.as_str())).cloned().collect();
-    let expected = merge::expected(dataset, writer, given)?;
+    let expected = merge::expected(dataset, writer, given)?.into_iter().map(|file| {
+        let of_release = writer != WRITER && OF_RELEASE.contains(&file.path.as_str());
+        let listed = merged.iter().find(|listed| of_release && listed.path == file.path);
+        listed.cloned().unwrap_or(file)
+    });
+    Ok(expected.collect())
+}
+
+/// Returns the merged files that differ from those computed from the shards.
+fn merged_findings(expected: &[FileRecord], merged: &[FileRecord]) -> Vec<Finding> {
     let mut findings = Vec::new();
-    for file in &expected {
-        // Texts and compressed bytes depend on the release that wrote them.
-        let of_program = [names::CARD, names::CROISSANT, names::SHEET, names::OBJECTS, names::HUGGINGFACE_CARD];
-        let is_ours = writer == WRITER || !of_program.contains(&file.path.as_str());
+    for file in expected {
         let message = match merged.iter().find(|found| found.path == file.path) {
-            Some(found) if found == file || !is_ours => continue,
+            Some(found) if found == file => continue,
             Some(_) => "differs from the shards",
             None => "missing from the list of files in manifest.json",
         };
@@ -288,7 +298,7 @@ fn merged_findings(dataset: &Dataset, writer: &str, merged: &[FileRecord]) -> Re
     for file in merged.iter().filter(|file| expected.iter().all(|expected| expected.path != file.path)) {
         findings.push(Finding::damaged(&file.path, "listed in manifest.json, but not written by papsynth"));
     }
-    Ok(findings)
+    findings
 }
 
 /// Returns the parts of a range that contain none of the sorted indices.
