@@ -16,6 +16,11 @@ pub(crate) fn json(value: &impl Serialize) -> Vec<u8> {
     serde_json::to_vec(value).expect(HAS_JSON)
 }
 
+/// Appends a value as compact JSON.
+pub(crate) fn json_into(value: &impl Serialize, bytes: &mut Vec<u8>) {
+    serde_json::to_writer(bytes, value).expect(HAS_JSON);
+}
+
 /// Returns a value as JSON with one field per line.
 pub(crate) fn json_lines(value: &impl Serialize) -> Vec<u8> {
     serde_json::to_vec_pretty(value).expect(HAS_JSON)

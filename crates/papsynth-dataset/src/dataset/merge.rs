@@ -381,7 +381,7 @@ mod tests {
     #[test]
     fn after_any_disk_failure_no_file_is_partial_and_the_next_run_completes_the_set() {
         // The manifest is written at the start and at the end.
-        let failures = fault::everywhere("faults", 40, names::MANIFEST, make);
+        let failures = fault::everywhere("faults", 60, names::MANIFEST, make);
         assert!(failures > 50, "{failures}");
     }
 }

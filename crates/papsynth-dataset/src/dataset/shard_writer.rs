@@ -10,7 +10,7 @@ use papsynth::{Finished, Plane, white_level as white};
 use super::record::{FORMAT_VERSION, ShardRecord, WRITER, read_record};
 use super::set::Dataset;
 use crate::error::Error;
-use crate::files::{Output, Pending};
+use crate::files::{FileRecord, Output, Pending};
 use crate::formats::parquet::Table;
 use crate::formats::{Field, Files, Sink, names};
 use crate::truth::{Document, FrameSummary, Image, Info, Row, extends_beyond, table, typed_columns};
@@ -161,9 +161,7 @@ impl ShardWriter<'_> {
             sink.close(&mut files)?;
         }
         let mut files = files.written;
-        for pending in self.truth.end()? {
-            files.push(pending.commit()?);
-        }
+        files.extend(self.truth.commit()?);
         files.sort_by(|a, b| a.path.cmp(&b.path));
         let record = ShardRecord {
             version: FORMAT_VERSION,
@@ -233,19 +231,19 @@ impl TruthFiles {
         self.table.bytes(rows)
     }
 
-    fn end(mut self) -> Result<Vec<Pending>, Error> {
+    fn commit(mut self) -> Result<Vec<FileRecord>, Error> {
         self.coco.bytes(b"],\"images\":[")?;
         for (number, image) in self.images.iter().enumerate() {
             self.coco.bytes(if number == 0 { b"\n" } else { b",\n" })?;
             self.coco.json(image)?;
         }
         self.coco.bytes(b"]}\n")?;
-        let mut ended = vec![self.coco.into_pending()?, self.table.into_pending()?];
+        let mut files = vec![self.coco.commit()?, self.table.commit()?];
         if let Some((pending, table)) = self.objects {
             table.end()?;
-            ended.push(pending);
+            files.push(pending.commit()?);
         }
-        Ok(ended)
+        Ok(files)
     }
 }
 

@@ -180,8 +180,7 @@ impl Folder {
         name: &str,
         fill: impl FnOnce(&mut Output) -> Result<(), Error>,
     ) -> Result<FileRecord, Error> {
-        let mut pending = self.filled(name, fill)?;
-        let record = pending.seal()?;
+        let (mut pending, record) = self.filled(name, fill)?;
         if self.defect(&record, Check::Hashes)?.is_some() {
             pending.rename()?;
         }
@@ -195,13 +194,17 @@ impl Folder {
         name: &str,
         fill: impl FnOnce(&mut Output) -> Result<(), Error>,
     ) -> Result<bool, Error> {
-        self.filled(name, fill)?.commit_new()
+        self.filled(name, fill)?.0.rename_new()
     }
 
-    fn filled(&self, name: &str, fill: impl FnOnce(&mut Output) -> Result<(), Error>) -> Result<Pending, Error> {
+    fn filled(
+        &self,
+        name: &str,
+        fill: impl FnOnce(&mut Output) -> Result<(), Error>,
+    ) -> Result<(Pending, FileRecord), Error> {
         let mut output = Output::new(self.pending(name)?)?;
         fill(&mut output)?;
-        output.into_pending()
+        output.sealed()
     }
 
     /// Creates a temporary file. Its commit gives it this name.

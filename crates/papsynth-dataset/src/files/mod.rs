@@ -12,7 +12,7 @@ pub use cloud::Bucket;
 pub use folder::{Check, write_file};
 pub(crate) use folder::{Folder, last_part};
 pub use pending::FileRecord;
-pub(crate) use pending::{Handle, Output, Pending, is_desktop_file, is_temporary};
+pub(crate) use pending::{Output, Pending, is_desktop_file, is_temporary};
 pub use store::{Location, Store};
 
 use std::path::Path;

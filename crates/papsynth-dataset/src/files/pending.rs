@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
 use super::fault;
 use super::store::Remote;
-use crate::bytes::{json, measure, sha256};
+use crate::bytes::{hex, json_into, measure, sha256};
 use crate::error::Error;
 
 /// A file of a data set.
@@ -99,11 +100,14 @@ impl Pending {
         self.file.try_clone().map(Handle).map_err(Error::io("write", &self.path))
     }
 
-    /// Syncs the file to the disk and renames it to its name.
+    /// Syncs the file to the disk and renames it to its name. The file is read for its hash.
     pub(crate) fn commit(mut self) -> Result<FileRecord, Error> {
-        let record = self.seal()?;
+        let sealed = fault::sync(&self.file)
+            .and_then(|()| self.file.seek(SeekFrom::Start(0)))
+            .and_then(|_| measure(&mut self.file));
+        let (bytes, sha256) = sealed.map_err(Error::io("write", &self.path))?;
         self.rename()?;
-        Ok(record)
+        Ok(FileRecord { path: self.name.clone(), bytes, sha256 })
     }
 
     /// Writes `bytes` and commits the file.
@@ -114,9 +118,8 @@ impl Pending {
         Ok(FileRecord::of(&self.name, bytes))
     }
 
-    /// As [`commit`](Self::commit), but only if no file has the name. Returns whether the file was committed.
-    pub(super) fn commit_new(mut self) -> Result<bool, Error> {
-        self.seal()?;
+    /// Renames the synced file to its name, but only if no file has the name. Returns whether it was renamed.
+    pub(super) fn rename_new(mut self) -> Result<bool, Error> {
         if self.remote.is_none() {
             match fault::point().and_then(|()| fs::hard_link(&self.temporary, &self.path)) {
                 // Dropping `self` removes the temporary name.
@@ -127,16 +130,6 @@ impl Pending {
             }
         }
         self.rename().map(|()| true)
-    }
-
-    /// Syncs the file to the disk and returns its size and hash.
-    pub(super) fn seal(&mut self) -> Result<FileRecord, Error> {
-        let sealed = fault::sync(&self.file)
-            // The hash is that of the file on the disk.
-            .and_then(|()| self.file.seek(SeekFrom::Start(0)))
-            .and_then(|_| measure(&mut self.file));
-        let (bytes, sha256) = sealed.map_err(Error::io("write", &self.path))?;
-        Ok(FileRecord { path: self.name.clone(), bytes, sha256 })
     }
 
     pub(super) fn rename(&mut self) -> Result<(), Error> {
@@ -161,27 +154,66 @@ impl Drop for Pending {
     }
 }
 
+/// A file that is written from front to back, and hashed while it is written.
 pub(crate) struct Output {
     writer: BufWriter<Handle>,
+    hash: Sha256,
+    bytes: u64,
+    /// Buffer for JSON.
+    text: Vec<u8>,
     pending: Pending,
 }
 
 impl Output {
     pub(crate) fn new(pending: Pending) -> Result<Self, Error> {
-        Ok(Self { writer: BufWriter::new(pending.handle()?), pending })
+        Ok(Self { writer: BufWriter::new(pending.handle()?), hash: Sha256::new(), bytes: 0, text: Vec::new(), pending })
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.pending.path
     }
 
     pub(crate) fn bytes(&mut self, bytes: &[u8]) -> Result<(), Error> {
-        self.writer.write_all(bytes).map_err(Error::io("write", &self.pending.path))
+        self.write_all(bytes).map_err(|error| Error::io("write", self.path())(error))
     }
 
     pub(crate) fn json(&mut self, value: &impl Serialize) -> Result<(), Error> {
-        self.bytes(&json(value))
+        // The buffer is reused.
+        let mut text = std::mem::take(&mut self.text);
+        text.clear();
+        json_into(value, &mut text);
+        let written = self.bytes(&text);
+        self.text = text;
+        written
     }
 
-    pub(crate) fn into_pending(mut self) -> Result<Pending, Error> {
-        self.writer.flush().map_err(Error::io("write", &self.pending.path))?;
-        Ok(self.pending)
+    /// Syncs the file to the disk and renames it to its name.
+    pub(crate) fn commit(self) -> Result<FileRecord, Error> {
+        let (mut pending, record) = self.sealed()?;
+        pending.rename()?;
+        Ok(record)
+    }
+
+    /// Syncs the file to the disk.
+    pub(super) fn sealed(mut self) -> Result<(Pending, FileRecord), Error> {
+        let Self { pending, hash, bytes, .. } = self;
+        let sealed = self.writer.flush().and_then(|()| fault::sync(&pending.file));
+        sealed.map_err(Error::io("write", &pending.path))?;
+        let record = FileRecord { path: pending.name.clone(), bytes, sha256: hex(&hash.finalize()) };
+        Ok((pending, record))
+    }
+}
+
+impl Write for Output {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.writer.write(bytes)?;
+        self.hash.update(&bytes[..written]);
+        self.bytes += written as u64;
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush()
     }
 }
 

@@ -50,8 +50,9 @@ pub(super) fn check(written: &Written) -> Result<(), Error> {
 
 impl Sink for Frames {
     fn begin(&mut self, frame: &FrameSummary, files: &Files) -> Result<(), Error> {
-        let values = frame.values() as u64 * frame.planes_um.len() as u64;
-        let pages = |name: &str, bytes| Pages::new(files.folder.pending(name)?, bytes);
+        let planes = frame.planes_um.len();
+        let values = (frame.values() * planes) as u64;
+        let pages = |name: &str, bytes| Pages::new(files.folder.pending(name)?, planes, bytes);
         self.stack = frame.is_stack().then(|| pages(&names::image(frame), values * 2)).transpose()?;
         self.noise_free = Some(pages(&names::noise_free(frame.index), values * 4)?);
         Ok(())

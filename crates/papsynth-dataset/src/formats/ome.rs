@@ -1,7 +1,7 @@
 //! Images and labels as TIFF with OME-XML; and `ome-tiff`: an OME-TIFF for the image of each frame, and one for each
 //! group of labels in layers without overlap.
 
-use std::io::{self, Cursor};
+use std::io;
 
 use papsynth::Plane;
 use papsynth::truth::Group;
@@ -12,7 +12,7 @@ use super::sink::{Field, Files, Sink};
 use super::written::{Written, is_described};
 use crate::error::Error;
 use crate::truth::{FrameSummary, LabelRuns, layers};
-use crate::write::{Page, PageWriter, Pages, Pixels, compressed, is_large, label_pages};
+use crate::write::{Page, Pages, Pixels, compressed, is_large, label_pages, pyramid};
 
 /// `µm` as ASCII XML, because TIFF descriptions are ASCII.
 const MICROMETRE: &str = "&#181;m";
@@ -128,11 +128,7 @@ pub(super) fn ome_image(levels: &[u16], frame: &FrameSummary) -> io::Result<Vec<
     if !is_large(frame.width, frame.height) {
         return image_tiff(levels, frame, Some(&text));
     }
-    let mut out = Cursor::new(Vec::new());
-    let bytes = 3 * levels.len() as u64;
-    let levels = Levels::new(levels, frame);
-    PageWriter::new(&mut out, bytes)?.write_pyramid(levels.pixels(), &page(frame, Some(&text)))?;
-    Ok(out.into_inner())
+    pyramid(Levels::new(levels, frame).pixels(), &page(frame, Some(&text)))
 }
 
 /// Encodes a label image with 16 bits, or 32 if a label needs them.
@@ -176,15 +172,19 @@ pub(super) fn check(written: &Written) -> Result<(), Error> {
 
 impl Sink for Images {
     fn begin(&mut self, frame: &FrameSummary, files: &Files) -> Result<(), Error> {
-        let bytes = frame.values() as u64 * frame.planes_um.len() as u64 * 3;
-        self.image = Some(Pages::new(files.folder.pending(&name(frame.index))?, bytes)?);
+        let (pending, planes) = (files.folder.pending(&name(frame.index))?, frame.planes_um.len());
+        let bytes = (frame.values() * planes) as u64 * 3;
+        self.image = Some(match is_large(frame.width, frame.height) {
+            true => Pages::pyramids(pending, bytes)?,
+            false => Pages::new(pending, planes, bytes)?,
+        });
         Ok(())
     }
 
     fn plane(&mut self, plane: &Plane, frame: &FrameSummary, _: &Files) -> Result<(), Error> {
         let Some(pages) = &mut self.image else { return Ok(()) };
         let text = (plane.index == 0).then(|| description(frame));
-        pages.write_pyramid(Levels::new(&plane.grey, frame).pixels(), &page(frame, text.as_deref()))
+        pages.write(Levels::new(&plane.grey, frame).pixels(), &page(frame, text.as_deref()))
     }
 
     fn field(&mut self, field: &Field, files: &mut Files) -> Result<(), Error> {

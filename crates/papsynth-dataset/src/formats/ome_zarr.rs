@@ -198,7 +198,7 @@ impl Sink for Images {
         let broken = |error| failed(error, folder, &group, frame);
         for Level { encoder, mut output } in self.levels.drain(..) {
             output.bytes(&encoder.end().map_err(broken)?)?;
-            files.written.push(output.into_pending()?.commit()?);
+            files.written.push(output.commit()?);
         }
         let mut described = Vec::new();
         for Layer { labels, ids } in label_layers(field)? {

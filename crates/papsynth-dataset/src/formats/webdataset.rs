@@ -2,11 +2,9 @@
 //! dot: `json` (ground truth as COCO, and splits), `png` or, for a stack, `ome.tif` and `all-in-focus.png` (8 bits),
 //! `cytoplasm.png` and `nucleus.png` (labels of 16 bits).
 
-use std::cell::RefCell;
 use std::fs::File;
-use std::io::{self, BufReader, BufWriter, Cursor, ErrorKind, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufReader, ErrorKind, Read};
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
 
 use papsynth::Plane;
 use papsynth::truth::Group;
@@ -20,42 +18,21 @@ use super::sink::{Field, Files, Sink};
 use super::written::{LIMITS, Written, is_described};
 use crate::bytes::json;
 use crate::error::{Error, InputError};
-use crate::files::{Folder, Handle, Pending};
+use crate::files::{Folder, Output};
 use crate::truth::{FrameSummary, Split};
-use crate::write::{PageWriter, label_png};
+use crate::write::{PlainPages, label_png};
 
 pub(super) struct Shard {
-    tar: tar::Builder<BufWriter<Handle>>,
-    pending: Pending,
+    tar: tar::Builder<Output>,
+    path: PathBuf,
     /// The planes of a stack in memory, because a tar header has the size of the file.
-    stack: Option<(PageWriter<'static>, Memory)>,
-}
-
-/// A file in memory, shared with the encoder that writes it.
-#[derive(Debug, Clone, Default)]
-struct Memory(Rc<RefCell<Cursor<Vec<u8>>>>);
-
-impl Write for Memory {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.borrow_mut().write(bytes)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
-impl Seek for Memory {
-    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
-        self.0.borrow_mut().seek(position)
-    }
+    stack: Option<PlainPages<Vec<u8>>>,
 }
 
 impl Shard {
     pub(super) fn new(files: &Files) -> Result<Self, Error> {
-        let pending = files.folder.pending(&tar(files.shard))?;
-        let tar = tar::Builder::new(BufWriter::with_capacity(1 << 18, pending.handle()?));
-        Ok(Self { tar, pending, stack: None })
+        let output = Output::new(files.folder.pending(&tar(files.shard))?)?;
+        Ok(Self { path: output.path().to_owned(), tar: tar::Builder::new(output), stack: None })
     }
 
     /// Adds a file. The header has its name and size; the time is 0, so that equal frames give equal bytes.
@@ -64,7 +41,7 @@ impl Shard {
         header.set_size(bytes.len() as u64);
         header.set_mode(0o644);
         header.set_mtime(0);
-        self.tar.append_data(&mut header, name, bytes).map_err(Error::io("write", self.pending.path()))
+        self.tar.append_data(&mut header, name, bytes).map_err(Error::io("write", &self.path))
     }
 }
 
@@ -197,33 +174,30 @@ pub(super) fn check(written: &Written, tar: &mut Tar) -> Result<(), Error> {
 
 impl Sink for Shard {
     fn begin(&mut self, frame: &FrameSummary, _: &Files) -> Result<(), Error> {
-        self.stack = None;
-        if frame.is_stack() {
-            let (memory, bytes) = (Memory::default(), frame.values() as u64 * frame.planes_um.len() as u64);
-            let writer = PageWriter::new(memory.clone(), bytes).map_err(Error::io("encode", self.pending.path()))?;
-            self.stack = Some((writer, memory));
-        }
+        let planes = frame.planes_um.len();
+        let pages = || PlainPages::new(Vec::new(), planes, (frame.values() * planes) as u64);
+        self.stack = frame.is_stack().then(pages).transpose().map_err(Error::io("encode", &self.path))?;
         Ok(())
     }
 
     fn plane(&mut self, plane: &Plane, frame: &FrameSummary, _: &Files) -> Result<(), Error> {
-        let Some((writer, _)) = &mut self.stack else { return Ok(()) };
+        let Some(pages) = &mut self.stack else { return Ok(()) };
         let levels = to_training(&plane.grey, frame.bits);
         let frame = &frame.for_training();
         let text = (plane.index == 0).then(|| description(frame));
-        let written = writer.write(Levels::new(&levels, frame).pixels(), &page(frame, text.as_deref()));
-        written.map_err(Error::io("encode", self.pending.path()))
+        let written = pages.write(Levels::new(&levels, frame).pixels(), &page(frame, text.as_deref()));
+        written.map_err(Error::io("encode", &self.path))
     }
 
     fn field(&mut self, field: &Field, files: &mut Files) -> Result<(), Error> {
         let key = numbered(field.frame.index);
         let failed = |path| Error::io("encode", path);
-        let path = self.pending.path().to_owned();
+        let path = self.path.clone();
         self.add(&format!("{key}.json"), &json(&head(field)))?;
         match self.stack.take() {
             None => self.add(&format!("{key}.png"), field.png(Depth::Training).map_err(failed(&path))?)?,
-            Some((_, memory)) => {
-                self.add(&format!("{key}.ome.tif"), memory.0.borrow().get_ref())?;
+            Some(pages) => {
+                self.add(&format!("{key}.ome.tif"), &pages.into_inner())?;
                 self.add(&format!("{key}.all-in-focus.png"), field.png(Depth::Training).map_err(failed(&path))?)?;
             }
         }
@@ -239,11 +213,8 @@ impl Sink for Shard {
     }
 
     fn close(self: Box<Self>, files: &mut Files) -> Result<(), Error> {
-        let Self { tar, pending, .. } = *self;
-        let mut writer = tar.into_inner().map_err(Error::io("write", pending.path()))?;
-        writer.flush().map_err(Error::io("write", pending.path()))?;
-        drop(writer);
-        files.written.push(pending.commit()?);
+        let output = self.tar.into_inner().map_err(Error::io("write", &self.path))?;
+        files.written.push(output.commit()?);
         Ok(())
     }
 }

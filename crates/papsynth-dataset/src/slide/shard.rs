@@ -165,6 +165,6 @@ impl SlideSet {
             output.bytes(&encoder.plane(channel, plane, values).map_err(bad)?)?;
         }
         output.bytes(&encoder.end().map_err(bad)?)?;
-        output.into_pending()?.commit()
+        output.commit()
     }
 }

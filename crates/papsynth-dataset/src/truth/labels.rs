@@ -1,6 +1,6 @@
 //! Label images as runs: with one label per pixel, and in layers with all masks complete.
 
-use papsynth::truth::{Group, Mask, ObjectTruth, Truth};
+use papsynth::truth::{Group, Mask, ObjectTruth, Run, Truth};
 use serde::{Deserialize, Serialize};
 
 /// The label of a pixel where objects of a group overlap, in formats with one label per pixel.
@@ -115,31 +115,52 @@ impl LabelRuns {
         [width, height]: [usize; 2],
         label: impl Fn(&[u32]) -> u32,
     ) -> Self {
-        // Pixels at which a run of a mask begins, or has ended, in row-major order.
+        let mut waiting: Vec<(u32, &[Run])> = masks.map(|(id, mask)| (id, mask.runs())).collect();
+        waiting.retain(|(_, runs)| !runs.is_empty());
+        waiting.sort_by_key(|(_, runs)| std::cmp::Reverse(runs[0].y));
+        let mut all = Self { width, height, runs: Vec::new() };
+        // The runs of a row and below, of masks that begin in the row or above.
+        let mut begun: Vec<(u32, &[Run])> = Vec::new();
+        // Columns at which a mask begins or has ended.
         let mut edges: Vec<(usize, u32, bool)> = Vec::new();
-        for (id, mask) in masks {
-            for run in mask.runs() {
-                let at = |x: u32| run.y as usize * width + x as usize;
-                edges.extend([(at(run.x0), id, true), (at(run.x1), id, false)]);
+        let mut ids: Vec<u32> = Vec::new();
+        for y in 0..height {
+            let is_here = |run: &Run| run.y as usize == y;
+            while let Some(mask) = waiting.pop_if(|(_, runs)| is_here(&runs[0])) {
+                begun.push(mask);
             }
-        }
-        edges.sort_by_key(|edge| edge.0);
-        let (mut runs, mut ids, mut from): (Vec<(u32, usize)>, Vec<u32>, usize) = (Vec::new(), Vec::new(), 0);
-        for (at, id, begins) in edges.into_iter().chain([(width * height, 0, true)]) {
-            if at > from {
-                match (runs.last_mut(), label(&ids)) {
-                    (Some((last, count)), label) if *last == label => *count += at - from,
-                    (_, label) => runs.push((label, at - from)),
+            for (id, runs) in &mut begun {
+                while let [run, below @ ..] = *runs
+                    && is_here(run)
+                {
+                    edges.extend([(run.x0 as usize, *id, true), (run.x1 as usize, *id, false)]);
+                    *runs = below;
                 }
-                from = at;
             }
-            if begins {
-                ids.push(id);
-            } else if let Some(ended) = ids.iter().position(|other| *other == id) {
-                ids.swap_remove(ended);
+            begun.retain(|(_, runs)| !runs.is_empty());
+            edges.sort_unstable_by_key(|edge| edge.0);
+            let mut from = 0;
+            for (x, id, begins) in edges.drain(..) {
+                all.push(label(&ids), x - from);
+                from = x;
+                if begins {
+                    ids.push(id);
+                } else if let Some(ended) = ids.iter().position(|other| *other == id) {
+                    ids.swap_remove(ended);
+                }
             }
+            all.push(label(&ids), width - from);
         }
-        Self { width, height, runs }
+        all
+    }
+
+    /// Appends pixels of a label.
+    fn push(&mut self, label: u32, count: usize) {
+        match self.runs.last_mut() {
+            _ if count == 0 => {}
+            Some(last) if last.0 == label => last.1 += count,
+            _ => self.runs.push((label, count)),
+        }
     }
 
     pub(crate) fn fits_16_bits(&self) -> bool {
@@ -253,7 +274,6 @@ mod tests {
 
     #[test]
     fn masks_overlap_if_they_share_a_pixel() {
-        use papsynth::truth::Run;
         let mask = |runs: &[(u32, u32, u32)]| {
             Mask::from_runs(runs.iter().map(|&(y, x0, x1)| Run { y, x0, x1 }).collect::<Vec<_>>())
         };

@@ -77,7 +77,9 @@ fn transposed(runs: &[Run]) -> Vec<Run> {
         ends.extend(above.iter().chain(here).flat_map(|run| [run.x0, run.x1]));
         ends.sort_unstable();
         // Sorted in pairs, the ends are the columns that are in one of the rows, but not in both.
-        edges.extend(ends.chunks_exact(2).flat_map(|pair| pair[0]..pair[1]).map(|x| u64::from(x) << 32 | u64::from(y)));
+        for pair in ends.chunks_exact(2) {
+            edges.extend((pair[0]..pair[1]).map(|x| u64::from(x) << 32 | u64::from(y)));
+        }
     };
     let mut above: &[Run] = &[];
     for here in runs.chunk_by(|a, b| a.y == b.y).chain([&[][..]]) {

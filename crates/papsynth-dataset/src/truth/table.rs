@@ -1,5 +1,7 @@
 //! The table of objects.
 
+use std::fmt::Write;
+
 use papsynth::truth::{Bounds, ObjectTruth, Part, Truth};
 
 use super::rle;
@@ -110,14 +112,28 @@ impl Cell {
     /// Prints the value. Numbers have the fewest digits that give the same number back; list values are separated by
     /// semicolons.
     fn print(&self) -> String {
-        match self {
-            Self::Id(id) => id.to_string(),
-            Self::Whole(whole) => whole.to_string(),
-            Self::Number(number) => number.to_string(),
-            Self::Text(text) => text.clone(),
-            Self::Flag(flag) => flag.to_string(),
-            other => other.list().iter().map(Self::print).collect::<Vec<_>>().join(";"),
-        }
+        let mut text = String::new();
+        self.append_to(&mut text);
+        text
+    }
+
+    /// Appends the printed value to a text.
+    fn append_to(&self, text: &mut String) {
+        // Writing to a string cannot fail.
+        let _ = match self {
+            Self::Id(id) => write!(text, "{id}"),
+            Self::Whole(whole) => write!(text, "{whole}"),
+            Self::Number(number) => write!(text, "{number}"),
+            Self::Text(value) => text.write_str(value),
+            Self::Flag(flag) => write!(text, "{flag}"),
+            other => {
+                for (number, value) in other.list().iter().enumerate() {
+                    text.push_str(if number > 0 { ";" } else { "" });
+                    value.append_to(text);
+                }
+                Ok(())
+            }
+        };
     }
 }
 
@@ -186,8 +202,14 @@ fn csv<'a>(header: bool, columns: &[Named], rows: impl Iterator<Item = Row<'a>>)
     if header {
         writer.write_record(columns.iter().map(|(head, _)| head.name)).expect(FITS);
     }
+    let mut text = String::new();
     for row in rows {
-        writer.write_record(columns.iter().map(|(_, cell)| cell(&row).print())).expect(FITS);
+        for (_, cell) in columns {
+            text.clear();
+            cell(&row).append_to(&mut text);
+            writer.write_field(&text).expect(FITS);
+        }
+        writer.write_record(None::<&[u8]>).expect(FITS);
     }
     writer.into_inner().expect(FITS)
 }

@@ -123,9 +123,9 @@ impl BitWriter {
                 (4 * extra as usize + (beyond >> extra), extra)
             }
         };
-        self.symbol(257 + code);
-        self.put((beyond & ((1 << extra) - 1)) as u64, extra);
-        self.put(DISTANCES[N - 1], DISTANCE_BITS[N - 1]);
+        let (symbol, bits) = (SYMBOLS[257 + code], SYMBOL_BITS[257 + code]);
+        let rest = (beyond & ((1 << extra) - 1)) as u64 | DISTANCES[N - 1] << extra;
+        self.put(symbol | rest << bits, bits + extra + DISTANCE_BITS[N - 1]);
     }
 
     /// Begins the last block of the stream, with the code lengths of its symbols.

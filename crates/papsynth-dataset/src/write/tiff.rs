@@ -1,4 +1,4 @@
-//! TIFF: uncompressed pages, compressed images, and pyramids of large pages in tiles, for viewers that read only the
+//! TIFF: files of pages, compressed images, and pyramids of large pages in tiles, for viewers that read only the
 //! visible part.
 
 use std::borrow::Cow;
@@ -7,12 +7,13 @@ use std::ops::Range;
 
 use miniz_oxide::deflate::compress_to_vec_zlib;
 use tiff::encoder::{DirectoryEncoder, Rational, TiffEncoder, TiffKind, TiffKindBig, TiffKindStandard, TiffValue};
-use tiff::tags::{CompressionMethod, PhotometricInterpretation, Predictor, ResolutionUnit, SampleFormat, Tag};
+use tiff::tags::{CompressionMethod, PhotometricInterpretation, ResolutionUnit, SampleFormat, Tag};
 use tiff::{TiffError, TiffResult};
 
 use super::deflate::compressed_runs;
+use super::plain::PlainPages;
 use crate::error::Error;
-use crate::files::{FileRecord, Pending};
+use crate::files::{FileRecord, Output, Pending};
 use crate::truth::LabelRuns;
 
 pub(crate) trait Out: Write + Seek {}
@@ -39,7 +40,8 @@ pub(crate) enum Pixels<'a> {
 }
 
 impl<'a> Pixels<'a> {
-    fn len(self) -> usize {
+    /// Returns the number of values.
+    pub(super) fn len(self) -> usize {
         match self {
             Self::U8(data) => data.len(),
             Self::U16(data) => data.len(),
@@ -48,7 +50,7 @@ impl<'a> Pixels<'a> {
     }
 
     /// Returns the bits and the format of a sample.
-    fn sample(self) -> (u16, SampleFormat) {
+    pub(super) fn sample(self) -> (u16, SampleFormat) {
         match self {
             Self::U8(_) => (8, SampleFormat::Uint),
             Self::U16(_) => (16, SampleFormat::Uint),
@@ -57,7 +59,7 @@ impl<'a> Pixels<'a> {
     }
 
     /// Returns the bytes of a range of values, in native byte order.
-    fn bytes(self, range: Range<usize>) -> Cow<'a, [u8]> {
+    pub(super) fn bytes(self, range: Range<usize>) -> Cow<'a, [u8]> {
         match self {
             Self::U8(data) => data[range].data(),
             Self::U16(data) => data[range].data(),
@@ -67,35 +69,39 @@ impl<'a> Pixels<'a> {
 }
 
 /// Returns the photometric interpretation of an image.
-fn photometric(channels: usize) -> u16 {
+pub(super) fn photometric(channels: usize) -> u16 {
     match channels {
         3 => PhotometricInterpretation::RGB.to_u16(),
         _ => PhotometricInterpretation::BlackIsZero.to_u16(),
     }
 }
 
-/// Writes the resolution in pixels per centimetre, rounded to 0.001.
-fn resolution<W: Out, K: TiffKind>(directory: &mut DirectoryEncoder<W, K>, pixel_um: f64) -> TiffResult<()> {
+/// Returns the resolution in pixels per centimetre, rounded to 0.001.
+pub(super) fn per_centimetre(pixel_um: f64) -> Rational {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
     let n = (1e7 / pixel_um + 0.5) as u32;
+    Rational { n, d: 1000 }
+}
+
+fn resolution<W: Out, K: TiffKind>(directory: &mut DirectoryEncoder<W, K>, pixel_um: f64) -> TiffResult<()> {
     directory.write_tag(Tag::ResolutionUnit, ResolutionUnit::Centimeter.to_u16())?;
-    directory.write_tag(Tag::XResolution, Rational { n, d: 1000 })?;
-    directory.write_tag(Tag::YResolution, Rational { n, d: 1000 })
+    directory.write_tag(Tag::XResolution, per_centimetre(pixel_um))?;
+    directory.write_tag(Tag::YResolution, per_centimetre(pixel_um))
 }
 
 /// Largest size of the pages of a classic TIFF; larger ones need BigTIFF. Offsets are below 2³², and directories need
 /// some space.
-const CLASSIC_BYTES: u64 = 0xFF00_0000;
+pub(super) const CLASSIC_BYTES: u64 = 0xFF00_0000;
 
-/// Writes uncompressed pages one after the other. Noisy images hardly compress, and this takes a tenth of the time.
-pub(crate) enum PageWriter<'a> {
+/// Writes large pages as pyramids, one after the other.
+pub(crate) enum PyramidWriter<'a> {
     Classic(TiffEncoder<Box<dyn Out + 'a>, TiffKindStandard>),
     Big(TiffEncoder<Box<dyn Out + 'a>, TiffKindBig>),
 }
 
-impl<'a> PageWriter<'a> {
+impl<'a> PyramidWriter<'a> {
     /// Creates a file for about `bytes` bytes of pixels.
-    pub(crate) fn new(out: impl Out + 'a, bytes: u64) -> io::Result<Self> {
+    fn new(out: impl Out + 'a, bytes: u64) -> io::Result<Self> {
         let out: Box<dyn Out> = Box::new(out);
         match bytes < CLASSIC_BYTES {
             true => TiffEncoder::new(out).map(Self::Classic).map_err(as_io),
@@ -103,54 +109,60 @@ impl<'a> PageWriter<'a> {
         }
     }
 
-    pub(crate) fn write(&mut self, pixels: Pixels, page: &Page) -> io::Result<()> {
-        let written = match self {
-            Self::Classic(encoder) => plain_page(encoder, pixels, page),
-            Self::Big(encoder) => plain_page(encoder, pixels, page),
-        };
-        written.map_err(as_io)
-    }
-
-    /// Writes a large page as a pyramid in tiles, and a small page in strips.
-    pub(crate) fn write_pyramid(&mut self, pixels: Pixels, page: &Page) -> io::Result<()> {
-        if !is_large(page.width, pixels.len() / (page.width * page.channels).max(1)) {
-            return self.write(pixels, page);
-        }
-        let written = match (&mut *self, pixels) {
+    fn write(&mut self, pixels: Pixels, page: &Page) -> io::Result<()> {
+        let written = match (self, pixels) {
             (Self::Classic(encoder), Pixels::U8(data)) => pyramid_page(encoder, data, page),
             (Self::Classic(encoder), Pixels::U16(data)) => pyramid_page(encoder, data, page),
             (Self::Big(encoder), Pixels::U8(data)) => pyramid_page(encoder, data, page),
             (Self::Big(encoder), Pixels::U16(data)) => pyramid_page(encoder, data, page),
-            _ => return self.write(pixels, page),
+            (_, Pixels::F32(_)) => return Err(io::Error::other("pyramids are of integers")),
         };
         written.map_err(as_io)
     }
 }
 
+/// Encodes an image of integers as a pyramid.
+pub(crate) fn pyramid(pixels: Pixels, page: &Page) -> io::Result<Vec<u8>> {
+    let mut out = Cursor::new(Vec::new());
+    let bytes = pixels.bytes(0..pixels.len()).len() as u64 * 3 / 2;
+    PyramidWriter::new(&mut out, bytes)?.write(pixels, page)?;
+    Ok(out.into_inner())
+}
+
 /// A TIFF file that is renamed from its temporary name when it is complete.
-pub(crate) struct Pages {
-    pending: Pending,
-    writer: PageWriter<'static>,
+pub(crate) enum Pages {
+    Plain(PlainPages<Output>),
+    Pyramids(Pending, PyramidWriter<'static>),
 }
 
 impl Pages {
-    /// Creates a file for about `bytes` bytes of pixels.
-    pub(crate) fn new(pending: Pending, bytes: u64) -> Result<Self, Error> {
-        let writer = PageWriter::new(pending.handle()?, bytes).map_err(Error::io("write", pending.path()))?;
-        Ok(Self { pending, writer })
+    /// Starts a file of `pages` pages, with about `bytes` bytes of pixels.
+    pub(crate) fn new(pending: Pending, pages: usize, bytes: u64) -> Result<Self, Error> {
+        let path = pending.path().to_owned();
+        PlainPages::new(Output::new(pending)?, pages, bytes).map(Self::Plain).map_err(Error::io("write", &path))
+    }
+
+    /// Starts a file of large pages, which are written as pyramids, with about `bytes` bytes of pixels.
+    pub(crate) fn pyramids(pending: Pending, bytes: u64) -> Result<Self, Error> {
+        let writer = PyramidWriter::new(pending.handle()?, bytes).map_err(Error::io("write", pending.path()))?;
+        Ok(Self::Pyramids(pending, writer))
     }
 
     pub(crate) fn write(&mut self, pixels: Pixels, page: &Page) -> Result<(), Error> {
-        self.writer.write(pixels, page).map_err(Error::io("write", self.pending.path()))
-    }
-
-    /// Writes a large page as a pyramid.
-    pub(crate) fn write_pyramid(&mut self, pixels: Pixels, page: &Page) -> Result<(), Error> {
-        self.writer.write_pyramid(pixels, page).map_err(Error::io("write", self.pending.path()))
+        match self {
+            Self::Plain(pages) => {
+                let written = pages.write(pixels, page);
+                written.map_err(|error| Error::io("write", pages.inner().path())(error))
+            }
+            Self::Pyramids(pending, writer) => writer.write(pixels, page).map_err(Error::io("write", pending.path())),
+        }
     }
 
     pub(crate) fn commit(self) -> Result<FileRecord, Error> {
-        self.pending.commit()
+        match self {
+            Self::Plain(pages) => pages.into_inner().commit(),
+            Self::Pyramids(pending, _) => pending.commit(),
+        }
     }
 }
 
@@ -245,60 +257,13 @@ fn compressed_page(
     directory.write_tag(Tag::StripByteCounts, sizes.as_slice())?;
     directory.write_tag(Tag::SampleFormat, vec![format.to_u16(); page.channels].as_slice())?;
     resolution(&mut directory, page.pixel_um)?;
-    head(&mut directory, height, rows, CompressionMethod::Deflate, page)?;
-    directory.finish()
-}
-
-/// Smallest size of a strip of uncompressed pages, bytes.
-const PLAIN_STRIP_BYTES: usize = 1_000_000;
-
-/// Writes an uncompressed page, with the same bytes as the encoder of the library.
-fn plain_page<K: TiffKind>(
-    encoder: &mut TiffEncoder<Box<dyn Out + '_>, K>,
-    pixels: Pixels,
-    page: &Page,
-) -> TiffResult<()> {
-    let row = (page.width * page.channels).max(1);
-    let (bits, format) = pixels.sample();
-    let rows = PLAIN_STRIP_BYTES.div_ceil(row * usize::from(bits / 8));
-    let mut directory = encoder.image_directory()?;
-    for tag in [Tag::XResolution, Tag::YResolution] {
-        // Replaced below; the library leaves the first value in the file.
-        directory.write_tag(tag, Rational { n: 1, d: 1 })?;
-    }
-    if let Some(text) = page.text {
-        directory.write_tag(Tag::ImageDescription, text)?;
-    }
-    resolution(&mut directory, page.pixel_um)?;
-    let (mut offsets, mut sizes) = (Vec::new(), Vec::new());
-    for from in (0..pixels.len()).step_by(rows * row) {
-        let strip = pixels.bytes(from..pixels.len().min(from + rows * row));
-        offsets.push(K::convert_offset(directory.write_data(&*strip)?)?);
-        sizes.push(K::convert_offset(strip.len() as u64)?);
-    }
-    directory.write_tag(Tag::BitsPerSample, vec![bits; page.channels].as_slice())?;
-    directory.write_tag(Tag::SampleFormat, vec![format.to_u16(); page.channels].as_slice())?;
-    directory.write_tag(Tag::StripOffsets, K::convert_slice(&offsets))?;
-    directory.write_tag(Tag::StripByteCounts, K::convert_slice(&sizes))?;
-    directory.write_tag(Tag::Predictor, Predictor::None.to_u16())?;
-    head(&mut directory, pixels.len() / row, rows, CompressionMethod::None, page)?;
-    directory.finish()
-}
-
-/// Writes the tags that are common to all pages in strips. Their values are in the directory itself.
-fn head<K: TiffKind>(
-    directory: &mut DirectoryEncoder<Box<dyn Out + '_>, K>,
-    height: usize,
-    rows: usize,
-    compression: CompressionMethod,
-    page: &Page,
-) -> TiffResult<()> {
     directory.write_tag(Tag::ImageWidth, u32::try_from(page.width)?)?;
     directory.write_tag(Tag::ImageLength, u32::try_from(height)?)?;
-    directory.write_tag(Tag::Compression, compression.to_u16())?;
+    directory.write_tag(Tag::Compression, CompressionMethod::Deflate.to_u16())?;
     directory.write_tag(Tag::PhotometricInterpretation, photometric(page.channels))?;
     directory.write_tag(Tag::SamplesPerPixel, u16::try_from(page.channels)?)?;
-    directory.write_tag(Tag::RowsPerStrip, u32::try_from(rows)?)
+    directory.write_tag(Tag::RowsPerStrip, u32::try_from(rows)?)?;
+    directory.finish()
 }
 
 /// Width and height of a tile.
