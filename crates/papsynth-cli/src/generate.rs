@@ -28,7 +28,7 @@ pub(crate) fn run(args: &Generate) -> Result<(), ExitError> {
     let frames = args.indices();
     let count = frames.end - frames.start;
     let (layout, chosen) = args.layout.layout(frames.end);
-    if let Some(message) = layout.refusal_of(&frames) {
+    if let Some(message) = layout.refusal_of(&frames).or_else(|| layout.refusal()) {
         return Err(ExitError::input(message));
     }
     let task = args.task.task()?;

@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use papsynth_dataset::{Outcome, Progress as Step, Task};
+use papsynth_dataset::{Extra, Outcome, Progress as Step, Task};
 use serde_json::json;
 
 use crate::args::Generate;
@@ -56,6 +56,8 @@ pub(crate) struct Progress<'a> {
     bar: ProgressBar,
     /// Number of written frames that lack cells for which there was no room.
     crowded: AtomicU64,
+    /// Whether the data set has a contact sheet.
+    has_sheet: bool,
 }
 
 impl<'a> Progress<'a> {
@@ -71,7 +73,8 @@ impl<'a> Progress<'a> {
                 "event": "start", "dir": dir, "seed": seed, "frames": frames, "threads": threads, "memory_bytes": memory,
             }))?;
         }
-        Ok(Self { style, dir, bar, crowded: AtomicU64::new(0) })
+        let has_sheet = !args.layout.files.without.contains(&Extra::ContactSheet);
+        Ok(Self { style, dir, bar, crowded: AtomicU64::new(0), has_sheet })
     }
 
     /// Counts a frame. Ignores broken pipes.
@@ -132,12 +135,13 @@ impl<'a> Progress<'a> {
             Style::Bar | Style::Lines => {
                 let (dir, frames) = (dir.display(), frames_written(*written, *present));
                 let next = match task {
-                    Task::ALL => format!("Look at: {dir}/contact-sheet.png"),
+                    Task::ALL if self.has_sheet => format!("Look at: {dir}/contact-sheet.png\n"),
+                    Task::ALL => String::new(),
                     Task { index, total } => format!(
-                        "Task {index} of {total} is done. When all tasks are done, run: papsynth merge {dir} --frames {end}"
+                        "Task {index} of {total} is done. When all tasks are done, run: papsynth merge {dir} --frames {end}\n"
                     ),
                 };
-                exit::print(&format!("{dir}: {frames}\n{next}\n"))
+                exit::print(&format!("{dir}: {frames}\n{next}"))
             }
         }
     }

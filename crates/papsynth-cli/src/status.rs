@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use papsynth_dataset::{Check, Dataset, Location, VerifyProgress, missing_shards};
+use papsynth_dataset::{Check, Dataset, Extra, Location, VerifyProgress, missing_shards};
 
 use crate::args::{Clean, Merge, Status, Verify, check_of};
 use crate::exit::{self, ExitError};
@@ -72,7 +72,11 @@ pub(crate) fn merge(args: &Merge) -> Result<(), ExitError> {
         ));
     }
     let (frames, root) = (counted(summary.frames, "frame", "frames"), summary.root);
-    exit::print(&format!("{dir}: {frames}\nroot {root}\nLook at: {dir}/contact-sheet.png\n"))
+    let sheet = match dataset.layout().has_extra(Extra::ContactSheet) {
+        true => format!("Look at: {dir}/contact-sheet.png\n"),
+        false => String::new(),
+    };
+    exit::print(&format!("{dir}: {frames}\nroot {root}\n{sheet}"))
 }
 
 fn count(ranges: &[Range<u64>]) -> u64 {

@@ -24,6 +24,9 @@ pub(crate) fn run(args: &Submit) -> Result<(), ExitError> {
     check_here(&generate)?;
     let frames = generate.indices().end;
     let (layout, _) = generate.layout.layout(frames);
+    if let Some(message) = layout.refusal() {
+        return Err(ExitError::input(message));
+    }
     let shards = frames.div_ceil(layout.frames_per_shard);
     if args.tasks > shards {
         return Err(ExitError::with_help(

@@ -27,5 +27,5 @@ pub use error::{Error, InputError};
 #[cfg(feature = "cloud")]
 pub use files::Bucket;
 pub use files::{Check, FileRecord, Location, Store, write_file};
-pub use formats::{Format, Layout};
+pub use formats::{Extra, Format, Layout};
 pub use truth::{Category, Column, Flatten, FrameSummary, columns, rle, truths};

@@ -22,6 +22,7 @@ Examples:
   papsynth generate my.toml --out fields --frames 1000 --seed 7
   papsynth generate --preset dense --out dense --range 500..1000     frames 500 to 999
   papsynth generate --out sets --frames 200 --format folder,cellpose,yolo-seg
+  papsynth generate --out small --frames 200 --without noise-free,layers
   papsynth generate my.toml --out many --frames 100000 --task 3/20    task 3 of 0 to 19
   papsynth generate my.toml --out s3://bucket/many --frames 100000    keys as for AWS tools
   papsynth generate wide.toml --out wide --frames 20 --max-memory 2GiB

@@ -5,9 +5,9 @@ use std::sync::Once;
 
 use clap::Args;
 use papsynth::recipe::{CameraPreset, Preset};
-use papsynth_dataset::{Flatten, Format, Layout};
+use papsynth_dataset::{Extra, Flatten, Format, Layout};
 
-use super::values::{camera_parser, format_parser, integer, named, preset_parser};
+use super::values::{camera_parser, extra_parser, format_parser, integer, named, preset_parser};
 use crate::exit;
 use crate::words::counted;
 
@@ -86,6 +86,9 @@ pub(crate) struct FileArgs {
     /// huggingface]
     #[arg(long, value_name = "N", value_parser = integer(1, 1_000_000_u64))]
     pub(crate) frames_per_shard: Option<u64>,
+    /// Files to leave out, separated by commas
+    #[arg(long, value_name = "FILES", value_parser = extra_parser(), value_delimiter = ',')]
+    pub(crate) without: Vec<Extra>,
     /// Write the table of objects as CSV only, without Parquet
     #[cfg(feature = "parquet")]
     #[arg(long)]
@@ -107,7 +110,7 @@ impl LayoutArgs {
 
 impl FileArgs {
     pub(crate) fn layout(&self, formats: Vec<Format>) -> Layout {
-        let mut layout = Layout::new(formats);
+        let mut layout = Layout::new(formats).without(self.without.iter().copied());
         layout.flatten = self.flatten;
         #[cfg(feature = "parquet")]
         if self.no_parquet {

@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use papsynth::recipe::{CameraPreset, Preset};
-use papsynth_dataset::Format;
+use papsynth_dataset::{Extra, Format};
 
 /// Parses one of a few values by its name.
 pub(super) fn named<T: Copy + Send + Sync + 'static, const N: usize>(
@@ -49,6 +49,11 @@ pub(super) fn format_parser() -> impl TypedValueParser<Value = Format> {
             Err(format!("`--format {}` needs a build of papsynth with `--features {feature}`", format.name()))
         }
     })
+}
+
+/// Parses names of files that can be left out.
+pub(super) fn extra_parser() -> impl TypedValueParser<Value = Extra> {
+    explained(Extra::ALL, Extra::name, |extra| PossibleValue::new(extra.name()).help(extra.about()))
 }
 
 /// Parses integers of a range, both ends included.

@@ -47,6 +47,56 @@ fn tasks_write_the_files_of_one_run_and_merge_requires_all_shards() {
 }
 
 #[test]
+fn files_that_are_left_out_are_not_written_and_not_missed() {
+    let bench = Bench::new("without");
+    bench.good(&format!("generate --out all --frames 3 {TINY}"));
+    let without = "--without noise-free,layers,contact-sheet";
+    let frames = format!("--frames 3 {without} {TINY}");
+    let run = bench.good(&format!("generate --out some --task 1/2 {frames}"));
+    assert!(run.out.contains("papsynth merge some --frames 3"), "{}", run.out);
+    // The second run resumes and merges.
+    let run = bench.good(&format!("generate --out some {frames}"));
+    assert!(!run.out.contains("contact-sheet.png"), "{}", run.out);
+    root(&bench, "some", 3);
+    let run = bench.good("merge some --frames 3 --verify");
+    assert!(!run.out.contains("contact-sheet.png"), "{}", run.out);
+    let (all, some) = (bench.files("all"), bench.files("some"));
+    let left_out = |name: &str| {
+        name.starts_with("noise-free/") || name.starts_with("labels/layers/") || name == "contact-sheet.png"
+    };
+    assert_eq!(some.keys().collect::<Vec<_>>(), all.keys().filter(|name| !left_out(name)).collect::<Vec<_>>());
+    let records_the_layout =
+        |name: &str| name.starts_with("shards/") || ["README.md", "manifest.json", "croissant.json"].contains(&name);
+    for (name, bytes) in some.iter().filter(|(name, _)| !records_the_layout(name) || name.ends_with(".coco.json")) {
+        assert_eq!(*bytes, all[name], "{name}");
+    }
+    let card = String::from_utf8(some["README.md"].clone()).unwrap();
+    assert!(card.contains("| `images/, preview/, labels/` |") && card.contains("without noise-free, layers"), "{card}");
+    // A missing file that is not left out is found.
+    fs::remove_file(bench.path("some/labels/debris/000001.tif")).unwrap();
+    assert!(bench.run("verify some").out.contains("labels/debris/000001.tif"));
+    bench.good(&format!("generate --out some --verify {frames}"));
+    root(&bench, "some", 3);
+    // Another choice is another layout.
+    let run = bench.run(&format!("generate --out some --frames 3 {TINY}"));
+    assert!(run.code == 2 && run.err.contains("without noise-free, layers, contact-sheet"), "{}", run.err);
+    for (options, expected) in [
+        ("--without noise", "noise-free"),
+        ("--without noise-free --format cellpose", "cellpose does not contain it"),
+        ("--without labels --format folder,cellpose", "`cellpose` needs label images"),
+    ] {
+        let run = bench.run(&format!("generate --out none --frames 1 {options} {TINY}"));
+        assert!(run.code == 2 && run.err.contains(expected), "{}", run.err);
+    }
+    // Noise-free images can be left out of a conversion.
+    let run = bench.run("convert some --out converted --format folder");
+    assert!(run.code == 2 && run.err.contains("--without noise-free"), "{}", run.err);
+    bench.good("convert some --out converted --format folder --without noise-free");
+    root(&bench, "converted", 3);
+    assert!(!bench.path("converted/noise-free").exists() && bench.path("converted/labels/layers/000002.tif").exists());
+}
+
+#[test]
 fn four_processes_may_write_the_same_shards() {
     let bench = Bench::new("writers");
     let frames = format!("--frames 6 --format folder,webdataset --frames-per-shard 2 {TINY}");

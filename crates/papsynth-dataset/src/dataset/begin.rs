@@ -64,6 +64,9 @@ impl Dataset {
         if layout.formats.is_empty() || layout.frames_per_shard == 0 {
             return Err(Error::folder(path, "a data set needs at least 1 format and at least 1 frame a shard"));
         }
+        if let Some(message) = layout.refusal() {
+            return Err(Error::folder(path, message));
+        }
         if let Some((feature, what)) = layout.needs() {
             return Err(Error::missing_feature(&what, feature, path));
         }

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::set::{Dataset, Summary};
 use crate::files::FileRecord;
-use crate::formats::{Format, names};
+use crate::formats::{Extra, Format, names};
 
 /// Licence of the images: <https://spdx.org/licenses/CC0-1.0.html>.
 const LICENCE: &str = "https://creativecommons.org/publicdomain/zero/1.0/";
@@ -38,8 +38,24 @@ pub(super) fn card(dataset: &Dataset, writer: &str, summary: &Summary) -> String
         let _ = writeln!(text, "| `{what}` | {about} |");
     };
     for format in formats {
-        let place = if *format == Format::Folder { "images/, preview/, labels/, noise-free/" } else { format.name() };
-        row(place, format.about());
+        if *format != Format::Folder {
+            row(format.name(), format.about());
+            continue;
+        }
+        let layout = &dataset.layout;
+        let has = |extras: &[Extra]| extras.iter().any(|extra| layout.has_extra(*extra));
+        let folders = [
+            ("images/", true),
+            ("preview/", has(&[Extra::Preview])),
+            ("labels/", has(&[Extra::Labels, Extra::Layers])),
+            ("noise-free/", has(&[Extra::NoiseFree])),
+        ];
+        let folders: Vec<&str> = folders.into_iter().filter(|(_, is_there)| *is_there).map(|(name, _)| name).collect();
+        let about = match layout.without.is_empty() {
+            true => format.about().to_owned(),
+            false => format!("{}; {}", format.about(), layout.left_out()),
+        };
+        row(&folders.join(", "), &about);
     }
     row("shards/*.coco.json", "COCO with amodal and visible masks and all properties of every object");
     row("objects/*.csv", "the properties of every object as a table, without masks");

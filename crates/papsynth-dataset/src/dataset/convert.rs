@@ -11,7 +11,7 @@ use super::record::ShardRecord;
 use super::set::{Dataset, INPUT_BYTES};
 use crate::error::{Error, InputError};
 use crate::files::Check;
-use crate::formats::{Depth, Format, LIMITS, Layout, TRAINING_BITS, levels, names, to_camera};
+use crate::formats::{Depth, Extra, Format, LIMITS, Layout, TRAINING_BITS, levels, names, to_camera};
 use crate::read::{self, LevelImage};
 use crate::truth::{Document, FrameSummary};
 
@@ -29,12 +29,12 @@ pub fn convert(
     report: &(dyn Fn(Progress) + Sync),
 ) -> Result<Outcome, Error> {
     let source = Dataset::open(from)?;
-    if layout.has(Format::Folder) && !source.layout.has(Format::Folder) {
+    if layout.has_extra(Extra::NoiseFree) && !source.layout.has_extra(Extra::NoiseFree) {
         return refuse(
             &source,
             format!(
-                "the format `folder` needs noise-free images, which {} does not contain; generate the data set again with \
-                 `papsynth generate` and its recipe",
+                "the format `folder` needs noise-free images, which {} does not contain; leave them out with `--without \
+                 noise-free`, or generate the data set again with `papsynth generate` and its recipe",
                 source.layout
             ),
         );
@@ -134,7 +134,7 @@ impl<'a> OpenShard<'a> {
         };
         self.check_depth(format, frame, |_| true)?;
         let name = format.image(source.identity.seed, record.shard, frame);
-        let mut noise_free = match layout.has(Format::Folder) {
+        let mut noise_free = match layout.has_extra(Extra::NoiseFree) {
             true => {
                 let path = folder.inside(&names::noise_free(frame.index))?;
                 let bytes = read::bytes(&path, LIMITS.max_file_bytes)?;

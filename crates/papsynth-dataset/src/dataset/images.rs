@@ -13,7 +13,7 @@ use crate::error::{Error, InputError};
 use crate::files::Check;
 #[cfg(feature = "zarr")]
 use crate::formats::read_planes;
-use crate::formats::{Format, LIMITS, Take, TarFile, levels, names, parquet, to_camera};
+use crate::formats::{Extra, Format, LIMITS, Take, TarFile, levels, names, parquet, to_camera};
 use crate::read::{self, FieldFile, LevelImage, NucleiFile, files_in};
 use crate::truth::FrameSummary;
 
@@ -266,8 +266,8 @@ pub fn field_files(folder: &Path) -> Result<Vec<FieldFile>, Error> {
 fn of_dataset(path: &Path) -> Result<Vec<FieldFile>, Error> {
     let dataset = Dataset::open(path)?;
     let Dataset { folder, layout, .. } = &dataset;
-    if !layout.has(Format::Folder) {
-        let message = format!("the layout is {layout}; the format `folder` is needed to read images and labels");
+    if !layout.has_extra(Extra::Labels) {
+        let message = format!("the layout is {layout}; the format `folder` with labels is needed to read fields");
         return Err(Error::folder(path, message));
     }
     let mut fields = Vec::new();

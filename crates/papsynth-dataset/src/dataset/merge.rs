@@ -16,7 +16,7 @@ use crate::bytes::{hex, json, json_lines};
 use crate::error::Error;
 use crate::files::{Check, FileRecord, Folder};
 use crate::formats::parquet::Table;
-use crate::formats::{Format, names};
+use crate::formats::{Extra, Format, names};
 use crate::read;
 use crate::truth::{AmodalMask, Image, Info, Row, Split, typed_columns};
 use papsynth::white_level as white;
@@ -125,8 +125,10 @@ fn files(
             }
         }
         merged.push(process(names::SPLITS, &|out| splits(dataset, shards, out))?);
-        let sheet = contact_sheet(dataset, shards)?;
-        merged.push(process(names::SHEET, &|out| out(&sheet))?);
+        if dataset.layout.has_extra(Extra::ContactSheet) {
+            let sheet = contact_sheet(dataset, shards)?;
+            merged.push(process(names::SHEET, &|out| out(&sheet))?);
+        }
         let classes: Vec<String> = dataset.categories.iter().map(|category| category.name.clone()).collect();
         for format in &dataset.layout.formats {
             for (name, bytes) in format.shared(&classes, splits_there)? {

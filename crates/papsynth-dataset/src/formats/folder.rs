@@ -4,6 +4,7 @@ use papsynth::Plane;
 use papsynth::truth::Group;
 
 use super::depth::{Depth, TRAINING_BITS};
+use super::format::Extra;
 use super::names;
 use super::ome::{Levels, description, label_tiff, page};
 use super::sink::{Field, Files, Sink};
@@ -30,22 +31,28 @@ pub(super) fn check(written: &Written) -> Result<(), Error> {
     if frame.is_stack() {
         written.file(&names::all_in_focus(index), |bytes| written.image(bytes, Depth::Camera))?;
     }
-    if frame.bits > TRAINING_BITS {
+    let has = |extra| written.layout.has_extra(extra);
+    if frame.bits > TRAINING_BITS && has(Extra::Preview) {
         written.file(&names::preview(index), |bytes| written.image(bytes, Depth::Training))?;
     }
-    written.file(&names::noise_free(index), |bytes| {
-        let due = frame.planes_um.len();
-        let pages = read::float_pages(bytes, &LIMITS, due)?;
-        InputError::unless(pages.len() == due, format!("{} planes; the record has {due}", pages.len()))?;
-        let fits = pages.iter().all(|page| page.len() == frame.values() && page.iter().all(|v| v.is_finite()));
-        InputError::unless(fits, "the size differs from the record, or some values are not finite")
-    })?;
-    for group in Group::ALL {
+    if has(Extra::NoiseFree) {
+        written.file(&names::noise_free(index), |bytes| {
+            let due = frame.planes_um.len();
+            let pages = read::float_pages(bytes, &LIMITS, due)?;
+            InputError::unless(pages.len() == due, format!("{} planes; the record has {due}", pages.len()))?;
+            let fits = pages.iter().all(|page| page.len() == frame.values() && page.iter().all(|v| v.is_finite()));
+            InputError::unless(fits, "the size differs from the record, or some values are not finite")
+        })?;
+    }
+    for group in Group::ALL.into_iter().filter(|_| has(Extra::Labels)) {
         let ids = truth.labels(group).ids;
         written.file(&names::labels(group, index), |bytes| written.labels(bytes, ids))?;
     }
-    let layers: Vec<u32> = truth.layers().into_iter().map(u32::from).collect();
-    written.file(&names::layers(index), |bytes| written.labels(bytes, layers))
+    if has(Extra::Layers) {
+        let layers: Vec<u32> = truth.layers().into_iter().map(u32::from).collect();
+        written.file(&names::layers(index), |bytes| written.labels(bytes, layers))?;
+    }
+    Ok(())
 }
 
 impl Sink for Frames {
@@ -54,7 +61,8 @@ impl Sink for Frames {
         let values = (frame.values() * planes) as u64;
         let pages = |name: &str, bytes| Pages::new(files.folder.pending(name)?, planes, bytes);
         self.stack = frame.is_stack().then(|| pages(&names::image(frame), values * 2)).transpose()?;
-        self.noise_free = Some(pages(&names::noise_free(frame.index), values * 4)?);
+        let noise_free = || pages(&names::noise_free(frame.index), values * 4);
+        self.noise_free = files.layout.has_extra(Extra::NoiseFree).then(noise_free).transpose()?;
         Ok(())
     }
 
@@ -70,7 +78,7 @@ impl Sink for Frames {
     }
 
     fn field(&mut self, field: &Field, files: &mut Files) -> Result<(), Error> {
-        let (frame, index) = (field.frame, field.frame.index);
+        let (frame, index, layout) = (field.frame, field.frame.index, files.layout);
         let image = match self.stack.take() {
             Some(pages) => {
                 files.written.push(pages.commit()?);
@@ -79,13 +87,15 @@ impl Sink for Frames {
             None => names::image(frame),
         };
         files.png(&image, field, Depth::Camera)?;
-        if frame.bits > TRAINING_BITS {
+        if frame.bits > TRAINING_BITS && layout.has_extra(Extra::Preview) {
             files.png(&names::preview(index), field, Depth::Training)?;
         }
-        for group in Group::ALL {
+        for group in Group::ALL.into_iter().filter(|_| layout.has_extra(Extra::Labels)) {
             files.encode(&names::labels(group, index), label_tiff(Flatten::Top.labels(field.truth, group), frame))?;
         }
-        files.encode(&names::layers(index), label_tiff(overlaps(field.truth), frame))?;
+        if layout.has_extra(Extra::Layers) {
+            files.encode(&names::layers(index), label_tiff(overlaps(field.truth), frame))?;
+        }
         if let Some(pages) = self.noise_free.take() {
             files.written.push(pages.commit()?);
         }

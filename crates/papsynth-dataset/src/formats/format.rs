@@ -130,6 +130,62 @@ impl Format {
     }
 }
 
+/// Files that a data set can be written without ([`Layout::without`]).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Extra {
+    /// Images without noise, of the format [`Folder`](Format::Folder).
+    NoiseFree,
+    /// Numbers of overlapping cytoplasms, of the format [`Folder`](Format::Folder).
+    Layers,
+    /// Label images of cytoplasm, nuclei and debris, of the format [`Folder`](Format::Folder).
+    Labels,
+    /// Images of 8 bits for cameras with more bits, of the format [`Folder`](Format::Folder).
+    Preview,
+    /// The contact sheet.
+    ContactSheet,
+}
+
+impl Extra {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::NoiseFree, Self::Layers, Self::Labels, Self::Preview, Self::ContactSheet];
+
+    /// Returns the name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NoiseFree => "noise-free",
+            Self::Layers => "layers",
+            Self::Labels => "labels",
+            Self::Preview => "preview",
+            Self::ContactSheet => "contact-sheet",
+        }
+    }
+
+    /// Returns a one-line description.
+    #[must_use]
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::NoiseFree => "images without noise, of the format folder: 5/6 of its bytes",
+            Self::Layers => "numbers of overlapping cytoplasms, of the format folder",
+            Self::Labels => "label images of cytoplasm, nuclei and debris, of the format folder",
+            Self::Preview => "images of 8 bits for cameras with more bits, of the format folder",
+            Self::ContactSheet => "contact-sheet.png",
+        }
+    }
+
+    /// Whether the files are part of a format.
+    fn is_of(self, format: Format) -> bool {
+        self == Self::ContactSheet || format == Format::Folder
+    }
+
+    /// Whether a format cannot be written without files of this kind.
+    fn is_needed_by(self, format: Format) -> bool {
+        use Format::{Cellpose, OmeTiff, OmeZarr, Stardist, Webdataset};
+        self == Self::Labels && [Cellpose, OmeTiff, OmeZarr, Stardist, Webdataset].contains(&format)
+    }
+}
+
 /// Largest number of frames of a shard.
 const MOST_FRAMES_PER_SHARD: u64 = 1_000_000_000;
 
@@ -150,6 +206,9 @@ pub struct Layout {
     /// Whether the scene of every frame is written, as JSON.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub scenes: bool,
+    /// The files that are left out, in the order of [`Extra::ALL`], without duplicates.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub without: Vec<Extra>,
 }
 
 impl Default for Layout {
@@ -170,7 +229,46 @@ impl Layout {
         formats.dedup();
         let many = formats.iter().any(|format| format.is_sharded());
         let frames_per_shard = if many { Self::FRAMES_PER_SHARD } else { 1 };
-        Self { formats, frames_per_shard, flatten: Flatten::Top, objects_parquet: HAS_PARQUET, scenes: false }
+        Self {
+            formats,
+            frames_per_shard,
+            flatten: Flatten::Top,
+            objects_parquet: HAS_PARQUET,
+            scenes: false,
+            without: Vec::new(),
+        }
+    }
+
+    /// Returns the layout without these files.
+    #[must_use]
+    pub fn without(mut self, extras: impl IntoIterator<Item = Extra>) -> Self {
+        self.without.extend(extras);
+        self.without.sort_unstable();
+        self.without.dedup();
+        self
+    }
+
+    /// Whether data sets of this layout have these files.
+    #[must_use]
+    pub fn has_extra(&self, extra: Extra) -> bool {
+        !self.without.contains(&extra) && self.formats.iter().any(|format| extra.is_of(*format))
+    }
+
+    /// Returns an error message if the layout is without files that one of its formats needs, or that none of its
+    /// formats has.
+    #[must_use]
+    pub fn refusal(&self) -> Option<String> {
+        self.without.iter().find_map(|&extra| {
+            let name = extra.name();
+            if let Some(format) = self.formats.iter().find(|format| extra.is_needed_by(**format)) {
+                return Some(format!("`{name}` cannot be left out: {} needs label images", format.title()));
+            }
+            let is_there = self.formats.iter().any(|format| extra.is_of(*format));
+            let formats = self.formats.iter().map(|format| format.name()).collect::<Vec<_>>().join(", ");
+            (!is_there).then(|| {
+                format!("`{name}` cannot be left out: {formats} does not contain it; only the format `folder` does")
+            })
+        })
     }
 
     /// Returns an error message if a range of frames does not begin at the start of a shard.
@@ -192,7 +290,13 @@ impl Layout {
             1..=MOST_FRAMES_PER_SHARD if !self.formats.is_sorted_by(|a, b| a < b) => {
                 "the formats of the layout are not sorted, or have duplicates".to_owned()
             }
-            1..=MOST_FRAMES_PER_SHARD => return Ok(()),
+            1..=MOST_FRAMES_PER_SHARD if !self.without.is_sorted_by(|a, b| a < b) => {
+                "the list `without` of the layout is not sorted, or has duplicates".to_owned()
+            }
+            1..=MOST_FRAMES_PER_SHARD => match self.refusal() {
+                Some(message) => message,
+                None => return Ok(()),
+            },
             frames => format!("frames_per_shard is {frames}; expected 1 to {MOST_FRAMES_PER_SHARD}"),
         };
         Err(InputError::broken("JSON", message))
@@ -212,6 +316,12 @@ impl Layout {
         format.or(table)
     }
 
+    /// Returns the names of the files that are left out, after "without".
+    pub(crate) fn left_out(&self) -> String {
+        let names: Vec<&str> = self.without.iter().map(|extra| extra.name()).collect();
+        format!("without {}", names.join(", "))
+    }
+
     /// Whether the data set has a format.
     #[must_use]
     pub fn has(&self, format: Format) -> bool {
@@ -225,13 +335,53 @@ impl fmt::Display for Layout {
         let table = if self.objects_parquet { ", objects also as Parquet" } else { "" };
         let frames = if self.frames_per_shard == 1 { "frame" } else { "frames" };
         let scenes = if self.scenes { ", with scenes" } else { "" };
+        let without = if self.without.is_empty() { String::new() } else { format!(", {}", self.left_out()) };
         write!(
             f,
-            "{} with {} {} per shard, {}{table}{scenes}",
+            "{} with {} {} per shard, {}{table}{scenes}{without}",
             names.join(","),
             self.frames_per_shard,
             frames,
             self.flatten.name()
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_that_a_format_needs_or_no_format_has_cannot_be_left_out() {
+        use Extra::{ContactSheet, Labels, Layers, NoiseFree, Preview};
+        let layout = |formats: &[Format], without: &[Extra]| {
+            Layout::new(formats.iter().copied()).without(without.iter().copied())
+        };
+        let all = layout(&[Format::Folder], &[ContactSheet, Layers, NoiseFree, Labels, Preview, Layers]);
+        assert_eq!(all.without, Extra::ALL);
+        assert!(all.check().is_ok() && Extra::ALL.iter().all(|extra| !all.has_extra(*extra)));
+        assert!(layout(&[Format::Folder, Format::Cellpose], &[NoiseFree, Layers]).refusal().is_none());
+        assert!(layout(&[Format::Cellpose], &[ContactSheet]).refusal().is_none());
+        for (formats, without, expected) in [
+            (&[Format::Folder, Format::Stardist][..], Labels, "the format `stardist` needs label images"),
+            (&[Format::Cellpose], NoiseFree, "only the format `folder` does"),
+            (&[Format::YoloSeg], Labels, "yolo-seg does not contain it"),
+        ] {
+            let layout = layout(formats, &[without]);
+            let message = layout.refusal().unwrap();
+            assert!(message.contains(expected) && message.contains(without.name()), "{message}");
+            assert!(layout.check().is_err());
+        }
+    }
+
+    #[test]
+    fn a_layout_without_files_is_read_back_and_an_older_one_has_all() {
+        let layout = Layout::default().without([Extra::Layers]);
+        let text = serde_json::to_string(&layout).unwrap();
+        assert!(text.ends_with(r#""without":["layers"]}"#), "{text}");
+        assert_eq!(serde_json::from_str::<Layout>(&text).unwrap(), layout);
+        let text = serde_json::to_string(&Layout::default()).unwrap();
+        assert!(!text.contains("without") && serde_json::from_str::<Layout>(&text).unwrap() == Layout::default());
+        assert!(layout.to_string().ends_with(", without layers"), "{layout}");
     }
 }

@@ -23,7 +23,7 @@ mod yolo;
 pub(crate) use depth::{Depth, TRAINING_BITS, to_camera};
 #[cfg(feature = "zarr")]
 pub(crate) use format::HAS_PARQUET;
-pub use format::{Format, Layout};
+pub use format::{Extra, Format, Layout};
 #[cfg(feature = "zarr")]
 pub(crate) use ome_zarr::{channels, read_planes};
 pub(crate) use sink::{Field, Files, Sink};
