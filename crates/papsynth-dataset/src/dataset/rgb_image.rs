@@ -3,7 +3,7 @@
 use std::io;
 use std::path::Path;
 
-use papsynth::truth::{Group, Mask};
+use papsynth::truth::{Group, Mask, Run};
 use papsynth::{Finished, Plane};
 
 use crate::error::Error;
@@ -77,8 +77,13 @@ impl RgbImage {
                 let mut sums = [0_u64; 3];
                 for row in rows.clone() {
                     let row = &image.levels[row * width * channels..];
-                    for pixel in row[columns.start * channels..columns.end * channels].chunks_exact(channels) {
-                        sums.iter_mut().zip(pixel).for_each(|(sum, &level)| *sum += u64::from(level));
+                    let row = &row[columns.start * channels..columns.end * channels];
+                    if channels == 1 {
+                        sums[0] += row.iter().map(|&level| u64::from(level)).sum::<u64>();
+                    } else {
+                        for pixel in row.chunks_exact(channels) {
+                            sums.iter_mut().zip(pixel).for_each(|(sum, &level)| *sum += u64::from(level));
+                        }
                     }
                 }
                 let full = (rows.len() * columns.len()) as u64 * u64::from(white);
@@ -156,17 +161,30 @@ fn span(i: usize, to: usize, from: usize) -> std::ops::Range<usize> {
 
 /// Returns the pixels of a mask with a neighbour outside it.
 fn edge(mask: &Mask) -> Vec<[u32; 2]> {
-    let Some(bounds) = mask.bounds() else { return Vec::new() };
-    // A margin of 1 pixel gives each pixel four neighbours.
-    let width = bounds.width as usize + 2;
-    let at = |x: u32, y: u32| (y - bounds.y + 1) as usize * width + (x - bounds.x + 1) as usize;
-    let mut inside = vec![false; width * (bounds.height as usize + 2)];
-    for run in mask.runs() {
-        inside[at(run.x0, run.y)..at(run.x1, run.y)].fill(true);
+    let rows: Vec<&[Run]> = mask.runs().chunk_by(|a, b| a.y == b.y).collect();
+    let row = |number: Option<usize>, y: Option<u32>| {
+        let found = number.and_then(|number| rows.get(number));
+        found.filter(|row| Some(row[0].y) == y).copied().unwrap_or_default()
+    };
+    let mut pixels = Vec::new();
+    for (number, runs) in rows.iter().enumerate() {
+        let y = runs[0].y;
+        let above = row(number.checked_sub(1), y.checked_sub(1));
+        let below = row(Some(number + 1), Some(y + 1));
+        for run in *runs {
+            let mut from = run.x0;
+            for (a, b) in above.iter().flat_map(|a| below.iter().map(move |b| (a, b))) {
+                // All four neighbours of these pixels are in the mask.
+                let (x0, x1) = (a.x0.max(b.x0).max(run.x0 + 1), a.x1.min(b.x1).min(run.x1 - 1));
+                if x0 < x1 {
+                    pixels.extend((from..x0).map(|x| [x, y]));
+                    from = x1;
+                }
+            }
+            pixels.extend((from..run.x1).map(|x| [x, y]));
+        }
     }
-    let on_edge = |i: usize| !(inside[i - 1] && inside[i + 1] && inside[i - width] && inside[i + width]);
-    let pixels = mask.runs().iter().flat_map(|run| (run.x0..run.x1).map(|x| [x, run.y]));
-    pixels.filter(|&[x, y]| on_edge(at(x, y))).collect()
+    pixels
 }
 
 /// Thumbnails of the first frames with outlines and names.
@@ -232,4 +250,30 @@ pub fn write_png(
 ) -> Result<(), Error> {
     let bytes = write::png(levels, width, channels, bits, pixel_um).map_err(Error::io("write", path))?;
     write_file(path, &bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn the_edge_is_the_pixels_without_four_neighbours(
+            width in 1_usize..12,
+            pixels in proptest::collection::vec(proptest::bool::weighted(0.8), 144),
+        ) {
+            let tile: Vec<f32> = pixels.iter().map(|&inside| f32::from(u8::from(inside))).collect();
+            let mask = Mask::from_tile(&tile, width, [0, 0], width, 144 / width, |v| v > 0.5);
+            let all: Vec<[usize; 2]> = mask.pixels(width).map(|pixel| [pixel % width, pixel / width]).collect();
+            let has = |x: usize, y: usize| all.contains(&[x, y]);
+            let is_inside = |[x, y]: [usize; 2]| {
+                x > 0 && y > 0 && has(x - 1, y) && has(x + 1, y) && has(x, y - 1) && has(x, y + 1)
+            };
+            let expected: Vec<_> = all.iter().copied().filter(|&pixel| !is_inside(pixel)).collect();
+            let found: Vec<_> = edge(&mask).into_iter().map(|pixel| pixel.map(|at| at as usize)).collect();
+            prop_assert_eq!(found, expected);
+        }
+    }
 }

@@ -197,7 +197,8 @@ mod tests {
         assert_eq!(decoder.get_tag_ascii_string(Tag::ImageDescription).unwrap(), "a text");
         assert_eq!(decoder.get_tag_u64(Tag::ResolutionUnit).unwrap(), 3);
         for (number, plane) in planes.iter().enumerate() {
-            assert_eq!(decoder.dimensions().unwrap(), (width as u32, height as u32));
+            let (columns, rows) = decoder.dimensions().unwrap();
+            assert_eq!([columns as usize, rows as usize], [width, height]);
             assert!(matches!(decoder.read_image().unwrap(), DecodingResult::U16(read) if read == *plane), "{number}");
             assert_eq!(decoder.more_images(), number + 1 < pages);
             if decoder.more_images() {
