@@ -33,8 +33,8 @@ pub fn convert(
         return refuse(
             &source,
             format!(
-                "the format `folder` needs noise-free images, which {} does not contain; leave them out with `--without \
-                 noise-free`, or generate the data set again with `papsynth generate` and its recipe",
+                "the format `folder` needs noise-free images, which {} does not contain; leave them out with \
+                 `--without noise-free`, or generate the data set again with `papsynth generate` and its recipe",
                 source.layout
             ),
         );
