@@ -381,19 +381,13 @@ fn amplitudes(absorbed: &[f32], behind: &[f32], amplitude: &mut [f32], square: &
 /// Replaces the spectrum of a = 1 − √T by that of a² = 2a − (1 − T), for the spectrum of 1 − T + iφ.
 #[multiversion(targets = "simd")]
 fn squares_of(amplitude: &mut [Lanes], light: &Spectrum) {
-    if light.minus.is_empty() {
-        for (a, light) in amplitude.iter_mut().zip(&light.plus) {
-            for l in 0..LANES {
-                a[0][l] = 2.0 * a[0][l] - light[0][l];
-                a[1][l] = 2.0 * a[1][l] - light[1][l];
-            }
-        }
-        return;
-    }
-    for (a, (plus, minus)) in amplitude.iter_mut().zip(light.plus.iter().zip(&light.minus)) {
-        for l in 0..LANES {
-            a[0][l] = 2.0 * a[0][l] - 0.5 * (plus[0][l] + minus[0][l]);
-            a[1][l] = 2.0 * a[1][l] - 0.5 * (plus[1][l] - minus[1][l]);
+    // (F(k) + F*(−k))/2, which is F(k) for a real image.
+    let (minus, sign) = if light.minus.is_empty() { (&light.plus, 0.5) } else { (&light.minus, -0.5) };
+    let factors = [[0.5; LANES], [sign; LANES]];
+    for ((a, plus), minus) in amplitude.iter_mut().zip(&light.plus).zip(minus) {
+        let from = plus.as_flattened().iter().zip(minus.as_flattened()).zip(factors.as_flattened());
+        for (a, ((plus, minus), factor)) in a.as_flattened_mut().iter_mut().zip(from) {
+            *a = 2.0 * *a - (0.5 * plus + factor * minus);
         }
     }
 }

@@ -94,6 +94,12 @@ impl Microscope {
         stage_um * self.params.mount_index / self.params.immersion_index - depth_um
     }
 
+    /// Returns whether the wavefront error of a depth is that of the opposite depth with the opposite sign, with the
+    /// stage at rest.
+    pub(crate) fn is_mirrored(&self) -> bool {
+        self.params.cover_error_um == 0.0 && self.params.zernike == Zernike::default()
+    }
+
     /// Returns the wavelengths of the band, in µm, and their weights, which sum to 1.
     pub(crate) fn bands(&self) -> Vec<(f64, f64)> {
         let (centre, width) = (self.params.wavelength_um, self.params.bandwidth_um);

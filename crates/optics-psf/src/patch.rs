@@ -393,20 +393,24 @@ impl TransferCache {
     fn samples(&self, numbers: RangeInclusive<i64>, stage_um: f64) -> Vec<Arc<Transfer>> {
         // The map stays valid if a thread panics.
         let lock = || self.cached.lock().unwrap_or_else(PoisonError::into_inner);
-        let key = |number| (stage_um.to_bits(), number);
+        // Without stage movement and aberrations, the wavefront changes its sign with the depth.
+        let mirrors = stage_um == 0.0 && self.microscope.is_mirrored();
+        let key = |number: i64| (stage_um.to_bits(), if mirrors { number.abs() } else { number });
         let cached: Vec<Option<Arc<Transfer>>> = {
             let cached = lock();
             numbers.clone().map(|number| cached.get(&key(number)).cloned()).collect()
         };
         let make = |(number, cached): (i64, Option<Arc<Transfer>>)| {
-            cached.unwrap_or_else(|| {
-                let transfer = Arc::new(Transfer::new(&self.microscope, -(number as f64) * self.step_um, stage_um));
+            let transfer = cached.unwrap_or_else(|| {
+                let depth_um = -(key(number).1 as f64) * self.step_um;
+                let transfer = Arc::new(Transfer::new(&self.microscope, depth_um, stage_um));
                 let mut cached = lock();
                 if cached.len() * transfer.table.len() >= MOST_ENTRIES {
                     cached.clear();
                 }
                 Arc::clone(cached.entry(key(number)).or_insert(transfer))
-            })
+            });
+            if mirrors && number < 0 { Arc::new(transfer.mirrored()) } else { transfer }
         };
         numbers.zip(cached).map(make).collect()
     }

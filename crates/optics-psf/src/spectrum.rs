@@ -388,14 +388,10 @@ fn join(turned: &[Lanes], support: &Support, pixels: Pixels, padded: usize, left
                 let (a, b) = (turned_rows(|l| &plus[left + l]), turned_rows(|l| &plus[left + LANES + l]));
                 // Exchanged parts of A + iB at k and of A* + iB* at −k, from exchanged parts of A and B.
                 let (mut above, mut below) = ([[[0.0; LANES]; LANES]; 2], [[[0.0; LANES]; LANES]; 2]);
-                for l in 0..LANES {
-                    for i in 0..LANES {
-                        above[0][l][i] = a[0][l][i] + b[1][l][i];
-                        above[1][l][i] = a[1][l][i] - b[0][l][i];
-                        below[0][l][i] = b[1][l][i] - a[0][l][i];
-                        below[1][l][i] = a[1][l][i] + b[0][l][i];
-                    }
-                }
+                sums(&mut above[0], &a[0], &b[1], 1.0);
+                sums(&mut above[1], &a[1], &b[0], -1.0);
+                sums(&mut below[0], &b[1], &a[0], -1.0);
+                sums(&mut below[1], &a[1], &b[0], 1.0);
                 (above, below)
             }
         };
@@ -414,6 +410,14 @@ fn join(turned: &[Lanes], support: &Support, pixels: Pixels, padded: usize, left
                 }
             }
         }
+    }
+}
+
+/// Computes a + sign · b in one loop; the compiler turns nested loops into gathers.
+#[inline(always)]
+fn sums(to: &mut [[f32; LANES]; LANES], a: &[[f32; LANES]; LANES], b: &[[f32; LANES]; LANES], sign: f32) {
+    for ((to, a), b) in to.as_flattened_mut().iter_mut().zip(a.as_flattened()).zip(b.as_flattened()) {
+        *to = a + sign * b;
     }
 }
 

@@ -92,6 +92,12 @@ impl Transfer {
         Self { step: parts[0].0.step, table }
     }
 
+    /// Returns the transfer functions of the opposite wavefront error: the effect of phase delay changes its sign.
+    pub(crate) fn mirrored(&self) -> Self {
+        let table = self.table.iter().map(|&[absorption, phase]| [absorption, phase.map(|part| -part)]);
+        Self { step: self.step, table: table.collect() }
+    }
+
     /// Returns whether the table has a single row.
     pub(crate) fn is_round(&self) -> bool {
         self.table.len() == SAMPLES
