@@ -10,12 +10,12 @@ use anyhow::{Result, bail, ensure};
 use crate::bench::counts;
 use crate::shell::{self, Skipped, skipped};
 use crate::workspace::Workspace;
-use crate::{browser, dataset, deps, equations, external, hashes, package, prose, supply, test};
+use crate::{browser, dataset, deps, equations, external, hashes, package, prose, supply, test, vectors};
 
 type Step = (&'static str, fn(&Workspace) -> Result<()>);
 
 /// In order of increasing time. The golden images are part of the tests.
-const STEPS: [Step; 13] = [
+const STEPS: [Step; 14] = [
     ("format", |workspace| shell::run(workspace.cargo().args(["fmt", "--all", "--check"]))),
     ("dependencies", deps::run),
     ("equations", equations::run),
@@ -25,6 +25,7 @@ const STEPS: [Step; 13] = [
     ("documentation", |workspace| documentation(workspace.cargo_light(&["doc"]))),
     ("tests", |workspace| test::suite(workspace, Workspace::cargo_light, &[])),
     ("data set", dataset::run),
+    ("vector code", vectors::run),
     ("instructions", |workspace| counts::run(workspace, false)),
     ("external readers", |workspace| external::run(workspace, false)),
     ("browser", browser::run),

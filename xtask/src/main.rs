@@ -20,6 +20,7 @@ mod realism;
 mod shell;
 mod supply;
 mod test;
+mod vectors;
 mod workspace;
 
 use std::process::ExitCode;
@@ -99,6 +100,11 @@ enum DevCommand {
     Equations,
     /// Checks the line width and the words of comments and Markdown
     Prose,
+    /// Checks that hot loops are compiled without gathers and scatters
+    ///
+    /// Builds `papsynth` in release mode and reads its machine code with objdump. xtask/src/vectors.rs lists the
+    /// functions.
+    Vectors,
     /// Checks and prints the dependencies between crates of the workspace, including those of tests
     ///
     /// xtask/src/deps.rs contains the rules, ARCHITECTURE.md the reasons.
@@ -202,6 +208,7 @@ fn run(command: DevCommand) -> Result<()> {
         DevCommand::Realism { quick } => realism::run(workspace, quick),
         DevCommand::Equations => equations::run(workspace),
         DevCommand::Prose => prose::run(workspace),
+        DevCommand::Vectors => vectors::run(workspace),
         DevCommand::Deps => deps::run(workspace),
         DevCommand::External { full } => external::run(workspace, full),
         DevCommand::Browser => browser::run(workspace),

@@ -293,9 +293,9 @@ impl EdgeBatch {
                 } else {
                     to[1][l]
                 };
-                // The integral right of the piece, over a width r, is r (q − ½ p₁ r), where q is the plane at the right
-                // border of the pixel. Along the piece r runs from r̄ − h to r̄ + h and q from q̄ − k to q̄ + k; the mean
-                // of their product is r̄ q̄ + h k / 3.
+                // The integral right of the piece, over a width r, is r (q − ½ p₁ r), where q is the plane at the
+                // right border of the pixel. Along the piece r runs from r̄ − h to r̄ + h and q from q̄ − k to
+                // q̄ + k; the mean of their product is r̄ q̄ + h k / 3.
                 let [p0, p1, p2] = [plane[0][l], plane[1][l], plane[2][l]];
                 let (dy, half) = (next_y - y[l], 0.5 * p1);
                 let centre = p0 + half + p1 * left[l] + p2 * (0.5 * (y[l] + next_y));

@@ -343,7 +343,7 @@ fn invalid_flats_are_rejected() {
     rejected(&bench, "--flat sizes --dark darks --bits 17", &["expected an integer from 8 to 16"]);
     rejected(&bench, "--flat sizes --dark no-such --bits 12", &["no-such", "no such folder"]);
     rejected(&bench, "--flat no-such --dark darks --bits 12", &["no-such"]);
-    frames("alike/1", &PAIR, 0.0);
+    frames("alike/1", &PAIR, 8.0);
     rejected(
         &bench,
         "--flat alike --dark darks --bits 12",

@@ -242,7 +242,7 @@ fn the_bytes_do_not_depend_on_the_split_into_runs() {
         stop: &AtomicBool::new(false),
         profile: None,
     };
-    assert!(stranger.generate(&engine, &run, &|_| ()).unwrap_err().to_string().contains("recipe"));
+    assert!(stranger.generate(&engine, &run, &|_| ()).unwrap_err().to_string().contains("the recipe of the engine"));
 }
 
 #[test]

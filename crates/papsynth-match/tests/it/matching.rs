@@ -165,7 +165,7 @@ fn parameters_of_held_out_recipes_are_recovered() {
     let setting = setting(view.simulated_px());
     let mut known = setting.base_values();
     known.set(Parameter::Pattern, 0.01);
-    let params = TableParams { recipes: 50, windows: WINDOWS, seed: 3 };
+    let params = TableParams { recipes: 80, windows: WINDOWS, seed: 3 };
     let plan = Plan::new(&setting, &known, &view, &engine, &params).unwrap();
     let sought = plan.sought().to_vec();
     assert!(sought.iter().all(|p| p.prior().source == Source::Simulated));
@@ -175,8 +175,7 @@ fn parameters_of_held_out_recipes_are_recovered() {
     let regression = Regression::new(&table.statistics, &table.places);
     let explained = |parameter: Parameter| regression.explained()[sought.iter().position(|p| *p == parameter).unwrap()];
     for parameter in [Parameter::Cells, Parameter::Blur] {
-        // With a density, the number of cells in a field varies for the same recipe.
-        assert!(explained(parameter) > 0.3, "{parameter:?}: {}", explained(parameter));
+        assert!(explained(parameter) > 0.4, "{parameter:?}: {}", explained(parameter));
     }
 
     let drawn = unseen(TRIALS, SEED);

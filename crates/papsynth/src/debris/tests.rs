@@ -293,18 +293,18 @@ fn at_most_one_percent_of_debris_exceeds_its_maximum_radius() {
             beyond += usize::from(ratio > 1.0);
         }
         // Slides crop objects at their maximum radius.
-        assert!(beyond * 100 <= total, "{}: {beyond} of {total}", kind.name());
+        assert!(beyond * 200 <= total, "{}: {beyond} of {total}", kind.name());
         assert!(largest > 0.25, "{}: {largest}", kind.name());
     }
 }
 
 #[test]
-fn at_most_one_percent_of_cells_exceeds_its_maximum_radius() {
+fn at_most_half_a_percent_of_cells_exceeds_its_maximum_radius() {
     let mut beyond = 0;
     let (mut total, mut largest) = (0, 0.0_f64);
     for preset in [Preset::Lbc, Preset::HighGrade, Preset::Endocervical, Preset::Oral, Preset::Atrophic] {
         let mut recipe = preset.recipe();
-        (recipe.field.width_px, recipe.field.height_px) = (800.0.into(), 600.0.into());
+        (recipe.field.width_px, recipe.field.height_px) = (1600.0.into(), 1200.0.into());
         recipe.field.pixel_um = 0.5.into();
         recipe.debris = Debris::none();
         let model = Model::builtin();

@@ -419,6 +419,7 @@ fn restore(factor: &mut Factor, refocused: &Factor, weights: &[f32], window: Win
         let at = (y + margin) * factor.width + margin;
         let values = factor.values[at..].iter_mut().zip(&refocused.values[at..]);
         for ((old, new), weight) in values.zip(weights) {
+            // Eq. 15.
             *old += weight * (new - *old);
         }
     }

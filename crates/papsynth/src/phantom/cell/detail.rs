@@ -243,7 +243,8 @@ fn ramp(like: &Tile, polygon: &[Point], centre: Point, inner: f64, outer: f64) -
     ramp
 }
 
-/// A ramp like that of [`ramp`] with wide steps: drawn with pixels [`COARSE`] times as large, and interpolated linearly.
+/// A ramp like that of [`ramp`] with wide steps: drawn with pixels [`COARSE`] times as large, and interpolated
+/// linearly.
 struct CoarseRamp {
     /// One pixel of margin surrounds the area of the tile.
     coarse: Tile,
