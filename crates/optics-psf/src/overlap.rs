@@ -213,7 +213,7 @@ mod tests {
     fn quadrature_rules_are_exact_for_polynomials() {
         for nodes in [2, 4, 7, 16, 64, 300] {
             let rule = quadrature_rule(nodes);
-            assert!(rule.len() >= nodes && rule.len() % 2 == 0);
+            assert!(rule.len() >= nodes && rule.len().is_multiple_of(2));
             for degree in 0..(2 * rule.len()).min(40) {
                 let power = |x: f64| (0..degree).fold(1.0, |p, _| p * x);
                 let integral: f64 = rule.iter().map(|&[x, w]| w * power(x)).sum();

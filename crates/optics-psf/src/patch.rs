@@ -14,10 +14,12 @@ use crate::{Error, Microscope, Transfer};
 pub struct PatchImager {
     transfers: TransferCache,
     plans: Arc<LanePlans>,
-    /// Canvases by size in pixels and samples per pixel.
-    canvases: Mutex<BTreeMap<([usize; 2], usize), Arc<Canvas>>>,
+    canvases: Mutex<BTreeMap<CanvasKey, Arc<Canvas>>>,
     in_focus: Filter,
 }
+
+/// Size in pixels, and samples per pixel.
+type CanvasKey = ([usize; 2], usize);
 
 /// The imaging properties at one depth and stage position.
 #[derive(Debug, Clone)]

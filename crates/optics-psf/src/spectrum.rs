@@ -452,9 +452,10 @@ mod tests {
         move |left, stripe| {
             for (row, stripe) in image.chunks_exact(width).zip(stripe.iter_mut()) {
                 let value = |x: usize| row.get(left + x).copied().unwrap_or([0.0; 2]);
-                for l in 0..LANES {
+                let [re, im] = stripe;
+                for (l, (re, im)) in re.iter_mut().zip(im).enumerate() {
                     let (first, second) = (value(l), value(LANES + l));
-                    (stripe[0][l], stripe[1][l]) = match pixels {
+                    (*re, *im) = match pixels {
                         Pixels::Complex => (first[0], first[1]),
                         Pixels::Real => (first[0], second[0]),
                     };

@@ -563,7 +563,7 @@ pub(super) mod tests {
             let mut tile = Tile { origin: [-4, 3], width: 40, values: vec![0.0; 40 * 30] };
             tile.cover(&disc([14.0, 17.0], 9.0));
             for (i, value) in tile.values.iter_mut().enumerate() {
-                *value *= 1.0 + 0.2 * ((i % 40) as f32 * 0.9).sin() + 0.3 * ((i / 40) as f32 * 0.4).cos();
+                *value *= 1.0 + 0.2 * libm::sinf((i % 40) as f32 * 0.9) + 0.3 * libm::cosf((i / 40) as f32 * 0.4);
             }
             let [mean, deviation] = tile.moments_within_pixels(n);
             let fine = tile.clone().refined(n);
