@@ -192,9 +192,9 @@ impl PatchImager {
         let reach = CONES * cone + fringes * params.wavelength_um / params.na;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a distance in pixels")]
         let pixels = (reach / params.pixel_um).ceil() as usize;
-        // Rounds up to 4, 5, 6 or 7 times 2ⁿ, so that similar depths share spectra.
-        let step = (pixels.next_power_of_two() / 8).max(1);
-        Ok(pixels.next_multiple_of(step))
+        // Rounds up to 4, 5 or 6 times 2ⁿ, so that similar depths share spectra.
+        let quarter = (pixels.next_power_of_two() / 8).max(1);
+        Ok(quarter * if pixels > 6 * quarter { 8 } else { pixels.div_ceil(quarter) })
     }
 
     /// Loads an object with several samples per pixel into `patch`: transmittances, 0 to 1, and phase delays in
@@ -395,16 +395,22 @@ impl TransferCache {
     fn samples(&self, numbers: RangeInclusive<i64>, stage_um: f64) -> Vec<Arc<Transfer>> {
         // The map stays valid if a thread panics.
         let lock = || self.cached.lock().unwrap_or_else(PoisonError::into_inner);
-        // Without stage movement and aberrations, the wavefront changes its sign with the depth.
-        let mirrors = stage_um == 0.0 && self.microscope.is_mirrored();
-        let key = |number: i64| (stage_um.to_bits(), if mirrors { number.abs() } else { number });
+        // Without aberrations, the wavefront changes its sign with depth and stage position.
+        let is_mirrored = |number: i64| {
+            let is_below = stage_um < 0.0 || (stage_um == 0.0 && number < 0);
+            is_below && self.microscope.is_mirrored()
+        };
+        let key = |number: i64| {
+            let (stage_um, number) = if is_mirrored(number) { (0.0 - stage_um, -number) } else { (stage_um, number) };
+            (stage_um.to_bits(), number)
+        };
         let cached: Vec<Option<Arc<Transfer>>> = {
             let cached = lock();
             numbers.clone().map(|number| cached.get(&key(number)).cloned()).collect()
         };
         let make = |(number, cached): (i64, Option<Arc<Transfer>>)| {
             let transfer = cached.unwrap_or_else(|| {
-                let depth_um = -(key(number).1 as f64) * self.step_um;
+                let (depth_um, stage_um) = (-(key(number).1 as f64) * self.step_um, f64::from_bits(key(number).0));
                 let transfer = Arc::new(Transfer::new(&self.microscope, depth_um, stage_um));
                 let mut cached = lock();
                 if cached.len() * transfer.table.len() >= MOST_ENTRIES {
@@ -412,7 +418,7 @@ impl TransferCache {
                 }
                 Arc::clone(cached.entry(key(number)).or_insert(transfer))
             });
-            if mirrors && number < 0 { Arc::new(transfer.mirrored()) } else { transfer }
+            if is_mirrored(number) { Arc::new(transfer.mirrored()) } else { transfer }
         };
         numbers.zip(cached).map(make).collect()
     }
@@ -439,7 +445,7 @@ mod tests {
             let transfers = TransferCache::new(&microscope);
             let depths: &[f64] = if params.zernike == coma { &[0.3] } else { &[0.0, 0.3, -1.1, 2.6, 5.2, -9.3] };
             for &depth in depths {
-                for stage in [0.0, 2.0] {
+                for stage in [0.0, 2.0, -2.0] {
                     let (found, exact) = (transfers.transfer(depth, stage), Transfer::new(&microscope, depth, stage));
                     for i in 0..150 {
                         let f = [0.02 * f64::from(i), 0.005 * f64::from(i)];

@@ -370,13 +370,16 @@ impl Srgb {
     /// Converts one pixel to grey levels, clamped to 0 and the highest level.
     #[inline(always)]
     fn convert(&self, levels: [f32; 3]) -> [f32; 3] {
-        self.matrix.map(|row| {
+        let mut colours = [0.0; 3];
+        // A loop: the closure of `map` may become a function.
+        for (colour, row) in colours.iter_mut().zip(&self.matrix) {
             let linear = self.input_scale * (row[0] * levels[0] + row[1] * levels[1] + row[2] * levels[2]);
             let at = linear.clamp(0.0, 1.0) * STEPS as f32;
             let step = at as usize;
             let (low, high) = (self.curve[step], self.curve[step + 1]);
-            low + (at - step as f32) * (high - low)
-        })
+            *colour = low + (at - step as f32) * (high - low);
+        }
+        colours
     }
 }
 
