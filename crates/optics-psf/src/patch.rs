@@ -210,8 +210,7 @@ impl PatchImager {
         self.load_layers(size.map(|side| side / samples_per_pixel), &[layer], patch);
     }
 
-    /// Loads an object in several layers into `patch`, which has `size_px` pixels. Layers after the first have no phase
-    /// delay.
+    /// Loads an object in several layers into `patch`, which has `size_px` pixels.
     ///
     /// # Panics
     ///
