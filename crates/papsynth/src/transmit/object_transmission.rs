@@ -162,29 +162,7 @@ impl DyeMixer {
                 self.transmittance(&tiles, on, &mut layer.behind, amounts);
                 continue;
             }
-            let tiles = if step == 1 {
-                let tiles: Vec<_> = own().map(|piece| (piece, Cow::Borrowed(&piece.absorbance))).collect();
-                self.transmittance(&tiles, on, &mut layer.transmittance, amounts);
-                tiles
-            } else {
-                // The mean of two points approximates that of a sample: T(A) is not linear.
-                let moments: Vec<_> = own().map(|piece| piece.absorbance.moments_within_pixels(step)).collect();
-                let mut transmit = |sign: f32, transmittance: &mut Vec<Vec<f32>>| {
-                    let tiles = own().zip(&moments).map(|(piece, [mean, deviation])| {
-                        let pairs = mean.values.iter().zip(&deviation.values);
-                        let values = pairs.map(|(mean, deviation)| mean + sign * deviation).collect();
-                        (piece, Cow::Owned(Tile { values, ..*mean }))
-                    });
-                    self.transmittance(&tiles.collect::<Vec<_>>(), on, transmittance, amounts);
-                };
-                transmit(1.0, &mut layer.transmittance);
-                transmit(-1.0, &mut layer.behind);
-                for (transmittance, other) in layer.transmittance.iter_mut().zip(&layer.behind) {
-                    average(transmittance, other);
-                }
-                layer.behind.clear();
-                own().zip(moments).map(|(piece, [mean, _])| (piece, Cow::Owned(mean))).collect()
-            };
+            let tiles = self.coarsest(&own().collect::<Vec<_>>(), on, layer, amounts);
             let finer = pieces.iter().filter(|piece| piece.step < step && piece.phase_rad != 0.0);
             let finer: Vec<_> = finer.map(|piece| (piece, resampled(piece, step, on))).collect();
             for (piece, tile) in tiles.iter().chain(&finer).filter(|(piece, _)| piece.phase_rad != 0.0) {
@@ -192,6 +170,38 @@ impl DyeMixer {
                 add(&mut layer.phase_rad, on, tile, piece.phase_rad as f32);
             }
         }
+    }
+
+    /// Computes the transmittance of the pieces of the first layer, and returns their mean absorbance in each sample.
+    fn coarsest<'a>(
+        &self,
+        pieces: &[&'a Piece],
+        window: Window,
+        layer: &mut TransmissionLayer,
+        amounts: &mut [Vec<f32>; DYES],
+    ) -> Vec<(&'a Piece, Cow<'a, Tile>)> {
+        let own = || pieces.iter().copied();
+        let step = own().map(|piece| piece.step).max().unwrap_or(1);
+        if step == 1 {
+            let tiles: Vec<_> = own().map(|piece| (piece, Cow::Borrowed(&piece.absorbance))).collect();
+            self.transmittance(&tiles, window, &mut layer.transmittance, amounts);
+            return tiles;
+        }
+        // T(A) is not linear: the mean of its values at the mean ± the deviation of A approximates that of a sample.
+        let moments: Vec<_> = own().map(|piece| piece.absorbance.moments_within_pixels(step)).collect();
+        let mut others = Vec::new();
+        for (sign, transmittance) in [(1.0, &mut layer.transmittance), (-1.0, &mut others)] {
+            let tiles = own().zip(&moments).map(|(piece, [mean, deviation])| {
+                let pairs = mean.values.iter().zip(&deviation.values);
+                let values = pairs.map(|(mean, deviation)| mean + sign * deviation).collect();
+                (piece, Cow::Owned(Tile { values, ..*mean }))
+            });
+            self.transmittance(&tiles.collect::<Vec<_>>(), window, transmittance, amounts);
+        }
+        for (transmittance, other) in layer.transmittance.iter_mut().zip(&others) {
+            average(transmittance, other);
+        }
+        own().zip(moments).map(|(piece, [mean, _])| (piece, Cow::Owned(mean))).collect()
     }
 
     /// Computes the transmittance of tiles of the same sampling in each channel.
