@@ -226,7 +226,7 @@ impl BrightField {
                 self.canvas.load(samples, &mut spectra, scratch);
                 spectra
             });
-            if filter.is_corrected {
+            if filter.is_corrected() {
                 self.canvas.correct(&self.in_focus, samples, spectra, scratch);
             }
             for image in [&mut *factor, phases] {

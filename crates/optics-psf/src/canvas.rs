@@ -205,14 +205,15 @@ impl Canvas {
         let Samples { absorbed, behind, width, offset, .. } = samples;
         let CanvasScratch { grid, amplitude, square, spectra: [of_amplitude, of_square], block: blurred } = scratch;
         amplitude.resize(absorbed.len(), 0.0);
-        square.resize(if behind.is_empty() { 0 } else { absorbed.len() }, 0.0);
-        amplitudes(absorbed, behind, amplitude, square);
+        amplitudes(absorbed, behind, amplitude);
         self.transform(amplitude, width, offset, of_amplitude, grid);
         if behind.is_empty() {
             // a² = 2a − (1 − T).
             of_square.plus.clone_from(&of_amplitude.plus);
             squares_of(&mut of_square.plus, &spectra.light);
         } else {
+            square.clear();
+            square.extend(amplitude.iter().map(|a| a * a));
             self.transform(square, width, offset, of_square, grid);
         }
         // Scales of the image, and of its spectrum at the object's number of samples.
@@ -361,9 +362,9 @@ fn fill(image: &[f32], width: usize, offset: usize, left: usize, stripe: &mut [L
     first < end
 }
 
-/// Computes a = √T₀ − √T and a² from T₀ − T and T₀, or only a if T₀ is 1, with `behind` and `square` empty.
+/// Computes a = √T₀ − √T from T₀ − T and T₀, which is 1 if `behind` is empty.
 #[multiversion(targets = "simd")]
-fn amplitudes(absorbed: &[f32], behind: &[f32], amplitude: &mut [f32], square: &mut [f32]) {
+pub(crate) fn amplitudes(absorbed: &[f32], behind: &[f32], amplitude: &mut [f32]) {
     // (T₀ − T)/(√T₀ + √T) is accurate for small absorption.
     if behind.is_empty() {
         for (amplitude, absorbed) in amplitude.iter_mut().zip(absorbed) {
@@ -371,10 +372,9 @@ fn amplitudes(absorbed: &[f32], behind: &[f32], amplitude: &mut [f32], square: &
         }
         return;
     }
-    for (((amplitude, square), absorbed), behind) in amplitude.iter_mut().zip(square).zip(absorbed).zip(behind) {
+    for ((amplitude, absorbed), behind) in amplitude.iter_mut().zip(absorbed).zip(behind) {
         let sum = behind.sqrt() + (behind - absorbed).max(0.0).sqrt();
-        let a = absorbed / sum.max(f32::MIN_POSITIVE);
-        (*amplitude, *square) = (a, a * a);
+        *amplitude = absorbed / sum.max(f32::MIN_POSITIVE);
     }
 }
 

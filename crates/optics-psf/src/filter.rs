@@ -5,7 +5,7 @@ use num_complex::Complex32;
 
 use crate::Microscope;
 use crate::spectrum::{LANES, Lanes, ZERO};
-use crate::transfer::{ASYMMETRIC_SAMPLES, Transfer, corners, fade};
+use crate::transfer::{ASYMMETRIC_SAMPLES, SAMPLES, Transfer, corners, fade};
 
 /// Defocus in µm of mountant up to which the in-focus correction has full weight, and from which it has none. Its
 /// effect is small at 1 µm.
@@ -24,8 +24,8 @@ const LEAST_TRANSFER: f32 = 0.1;
 /// Filter of one depth and stage position.
 #[derive(Debug, Clone)]
 pub(crate) struct Filter {
-    /// Whether the in-focus correction is applied.
-    pub(crate) is_corrected: bool,
+    /// Weight of the in-focus correction, from 0 to 1.
+    pub(crate) correction: f64,
     response: Response,
     restores: bool,
 }
@@ -64,17 +64,35 @@ impl Filter {
         let coherent = 1.0 - SCATTERED_APART * incoherence(params.condenser_na / params.na);
         let weight = coherent * fade((defocus - whole) / (gone - whole));
         let (radius, cutoff) = (microscope.cone_radius_um(depth_um, stage_um), microscope.cutoff());
-        let correction =
-            |f: f64| -weight * pillbox(TAU * f * radius) * fade((f / cutoff - TAPER_FROM) / (1.0 - TAPER_FROM));
-        let correction = |f: f64| if weight > 0.0 { correction(f) } else { 0.0 };
-        let response = Response::new(transfer, correction);
-        Self { is_corrected: weight > 0.0, response, restores: false }
+        let mut correction = [0.0; MOST_SAMPLES];
+        if weight > 0.0 {
+            pillboxes(TAU * transfer.step * radius, &mut correction);
+            for (i, value) in correction.iter_mut().enumerate() {
+                let f = transfer.step * i as f64;
+                *value *= -weight * fade((f / cutoff - TAPER_FROM) / (1.0 - TAPER_FROM));
+            }
+        }
+        let response = Response::new(transfer, &correction);
+        Self { correction: weight, response, restores: false }
     }
 
     /// Returns the filter of the in-focus transfer function, without correction.
     pub(crate) fn in_focus(microscope: &Microscope) -> Self {
-        let response = Response::new(&Transfer::new(microscope, 0.0, 0.0), |_| 0.0);
-        Self { is_corrected: false, response, restores: false }
+        let response = Response::new(&Transfer::new(microscope, 0.0, 0.0), &[0.0; MOST_SAMPLES]);
+        Self { correction: 0.0, response, restores: false }
+    }
+
+    pub(crate) fn is_corrected(&self) -> bool {
+        self.correction > 0.0
+    }
+
+    /// Returns the response to absorption at a frequency in cycles/µm, or `None` if it depends on the direction.
+    pub(crate) fn round_absorption(&self, frequency: f64, microscope: &Microscope) -> Option<f64> {
+        let Response::Round(tables) = &self.response else { return None };
+        let place = frequency / Transfer::step_of(microscope);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index of the table")]
+        let [value, rise] = tables[0].get(place as usize).copied().unwrap_or_default();
+        Some(f64::from(value) + (place - place.floor()) * f64::from(rise))
     }
 
     /// Turns the filter into one for objects that were already imaged in focus, through `in_focus` and the camera
@@ -89,7 +107,7 @@ impl Filter {
             }
             _ => unreachable!("filters of one microscope have the same shape"),
         }
-        (self.is_corrected, self.restores) = (false, true);
+        (self.correction, self.restores) = (0.0, true);
     }
 
     /// Computes the image of a block: absorbed light as the real part, the effect of phase delay as the imaginary part.
@@ -99,7 +117,7 @@ impl Filter {
     pub(crate) fn image(&self, at: Block<'_>, from: &BlockSpectrum<'_>, plus: &mut [Lanes], minus: &mut [Lanes]) {
         match &self.response {
             Response::Round(tables) => {
-                let correction = from.correction.filter(|_| self.is_corrected);
+                let correction = from.correction.filter(|_| self.is_corrected());
                 match (from.minus.is_empty(), correction) {
                     (true, None) => round::<true, false>(tables, self.restores, at, from, plus, minus),
                     (true, Some(_)) => round::<true, true>(tables, self.restores, at, from, plus, minus),
@@ -137,7 +155,7 @@ impl Filter {
                 let mirrored = from.minus.get(i).map_or(f, |lanes| complex(lanes).conj());
                 let [half_sum, half_difference] = [0.5 * (weights[0] + weights[1]), 0.5 * (weights[0] - weights[1])];
                 let correction = match from.correction {
-                    Some(correction) if self.is_corrected => weights[2] * complex(&correction[i]),
+                    Some(correction) if self.is_corrected() => weights[2] * complex(&correction[i]),
                     _ => Complex32::ZERO,
                 };
                 let above = half_sum * f + half_difference * mirrored + correction;
@@ -257,12 +275,13 @@ fn sided(table: &[[Complex32; 3]], x: f32, y: f32) -> [Complex32; 3] {
 
 impl Response {
     #[expect(clippy::cast_possible_truncation, reason = "spectra use single precision")]
-    fn new(transfer: &Transfer, correction: impl Fn(f64) -> f64) -> Self {
+    /// Tabulates responses; `correction` has values at the frequencies of the transfer functions.
+    fn new(transfer: &Transfer, correction: &[f64; MOST_SAMPLES]) -> Self {
         let list = transfer.table.iter().enumerate();
         if transfer.is_round() {
             let mut tables = Box::new([[[0.0; 2]; ENTRIES]; 3]);
             for (i, &[absorption, phase]) in list {
-                let values = [absorption[0], phase[0], correction(transfer.step * i as f64)];
+                let values = [absorption[0], phase[0], correction[i]];
                 tables.iter_mut().zip(values).for_each(|(table, value)| table[i][0] = value as f32);
             }
             for table in tables.iter_mut() {
@@ -274,7 +293,7 @@ impl Response {
         }
         let complex = |[re, im]: [f64; 2]| Complex32::new(re as f32, im as f32);
         let entry = |(i, &[absorption, phase]): (usize, &[[f64; 2]; 2])| {
-            let correction = correction(transfer.step * (i % ASYMMETRIC_SAMPLES) as f64);
+            let correction = correction[i % ASYMMETRIC_SAMPLES];
             [complex(absorption), complex(phase), complex([correction, 0.0])]
         };
         Self::Sided(list.map(entry).collect())
@@ -289,8 +308,12 @@ pub(crate) fn incoherence(ratio: f64) -> f64 {
     cube * cube * r
 }
 
-/// Returns the spectrum of a disc, 2 J₁(q)/q.
-pub(crate) fn pillbox(q: f64) -> f64 {
+/// Largest number of samples of a transfer function along a direction.
+const MOST_SAMPLES: usize = if SAMPLES > ASYMMETRIC_SAMPLES { SAMPLES } else { ASYMMETRIC_SAMPLES };
+
+/// Writes the spectrum of a disc, 2 J₁(q)/q, at multiples of `step`.
+#[multiversion(targets = "simd")]
+fn pillboxes(step: f64, values: &mut [f64; MOST_SAMPLES]) {
     /// Range of the power series ∑ (−q²/4)ᵏ / k! (k + 1)!: it loses less than half of the digits, and 20 terms suffice.
     const SERIES_TO: f64 = 8.0;
     const SERIES: [f64; 20] = {
@@ -302,11 +325,22 @@ pub(crate) fn pillbox(q: f64) -> f64 {
         }
         terms
     };
-    if q > SERIES_TO {
-        return 2.0 * libm::j1(q) / q;
+    for (i, value) in values.iter_mut().enumerate() {
+        let q = step * i as f64;
+        let t = 0.25 * q * q;
+        let mut sum = 0.0;
+        for term in SERIES.iter().rev() {
+            sum = sum * t + term;
+        }
+        *value = sum;
     }
-    let t = 0.25 * q * q;
-    SERIES.iter().rev().fold(0.0, |sum, term| sum * t + term)
+    for (i, value) in values.iter_mut().enumerate().rev() {
+        let q = step * i as f64;
+        if q <= SERIES_TO {
+            break;
+        }
+        *value = 2.0 * libm::j1(q) / q;
+    }
 }
 
 #[cfg(test)]
@@ -314,11 +348,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pillbox_matches_the_bessel_function() {
-        assert_eq!(pillbox(0.0), 1.0);
-        for i in 1..2000 {
-            let q = 0.01 * f64::from(i);
-            assert!((pillbox(q) - 2.0 * libm::j1(q) / q).abs() < 1e-11, "{q}");
+    fn pillboxes_match_the_bessel_function() {
+        let mut found = [0.0; MOST_SAMPLES];
+        for step in [0.0, 0.001, 0.013, 0.05] {
+            pillboxes(step, &mut found);
+            assert_eq!(found[0], 1.0);
+            for (i, found) in found.iter().enumerate().skip(1) {
+                let q = step * i as f64;
+                let expected = if q > 0.0 { 2.0 * libm::j1(q) / q } else { 1.0 };
+                assert!((found - expected).abs() < 1e-11, "{q}");
+            }
         }
     }
 }

@@ -21,6 +21,7 @@ mod patch;
 mod pupil;
 mod pyramid;
 mod scratch;
+mod smooth;
 mod spectrum;
 mod transfer;
 mod window;

@@ -2,10 +2,13 @@ use core::ops::RangeInclusive;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::canvas::{Canvas, CanvasScratch, Samples, Spectra, is_nonzero, transmit};
+use multiversion::multiversion;
+
+use crate::canvas::{Canvas, CanvasScratch, Samples, Spectra, amplitudes, is_nonzero, transmit};
 use crate::filter::{Filter, incoherence};
 use crate::grid::fast_length;
 use crate::microscope::distance;
+use crate::smooth::{SmoothCorrection, is_detailed};
 use crate::spectrum::LanePlans;
 use crate::{Error, Microscope, Transfer};
 
@@ -16,6 +19,7 @@ pub struct PatchImager {
     plans: Arc<LanePlans>,
     canvases: Mutex<BTreeMap<CanvasKey, Arc<Canvas>>>,
     in_focus: Filter,
+    smooth: Option<SmoothCorrection>,
 }
 
 /// Size in pixels, and samples per pixel.
@@ -72,6 +76,7 @@ pub struct Patch {
     size_px: [usize; 2],
     layers: Vec<LoadedLayer>,
     plans: Option<Arc<LanePlans>>,
+    padded: Vec<f32>,
 }
 
 impl Patch {
@@ -92,14 +97,31 @@ struct LoadedLayer {
     samples_per_pixel: usize,
     at_px: [usize; 2],
     is_empty: bool,
+    correction: Correction,
+    /// Variance of the amplitude, for [`Correction::Added`].
+    variance: Vec<f32>,
     padded: Vec<PaddedSpectra>,
     /// Number of entries of `padded` that belong to this layer; the others are left from earlier ones.
     fresh: usize,
 }
 
+/// How the in-focus correction of a layer is computed.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+enum Correction {
+    /// It is negligible.
+    #[default]
+    None,
+    /// Added to the absorbed light: see [`SmoothCorrection`].
+    Added,
+    /// From products of blurred images: see [`Canvas::correct`].
+    Products,
+}
+
 #[derive(Debug, Clone)]
 struct PaddedSpectra {
     margin_px: usize,
+    /// Weight of the variance that was added to the absorbed light.
+    added: f64,
     canvas: Arc<Canvas>,
     spectra: Spectra,
 }
@@ -109,6 +131,7 @@ struct PaddedSpectra {
 pub struct PatchScratch {
     canvas: CanvasScratch,
     phases: Vec<f32>,
+    absorbed: Vec<f32>,
 }
 
 /// Transmission factor of a patch: light relative to an empty slide, as the mean over each camera pixel.
@@ -134,11 +157,13 @@ impl PatchImager {
     /// Computes the data common to all depths.
     #[must_use]
     pub fn new(microscope: &Microscope) -> Self {
+        let in_focus = Filter::in_focus(microscope);
         Self {
             transfers: TransferCache::new(microscope),
             plans: Arc::default(),
             canvases: Mutex::default(),
-            in_focus: Filter::in_focus(microscope),
+            smooth: SmoothCorrection::new(microscope, &in_focus),
+            in_focus,
         }
     }
 
@@ -218,6 +243,7 @@ impl PatchImager {
     pub fn load_layers(&self, size_px: [usize; 2], layers: &[PatchLayer<'_>], patch: &mut Patch) {
         patch.size_px = size_px;
         patch.plans = Some(Arc::clone(&self.plans));
+        let oversampling = self.microscope().params().oversampling;
         patch.layers.resize_with(layers.len(), LoadedLayer::default);
         for (layer, loaded) in layers.iter().zip(&mut patch.layers) {
             let PatchLayer { transmittance, behind, phase_rad, width, samples_per_pixel: n, at_px } = *layer;
@@ -236,13 +262,22 @@ impl PatchImager {
             };
             copy(&mut loaded.behind, behind);
             copy(&mut loaded.phase, if is_nonzero(phase_rad) { phase_rad } else { &[] });
-            loaded.absorbed.clear();
-            if behind.is_empty() {
-                loaded.absorbed.extend(transmittance.iter().map(|t| 1.0 - t));
-            } else {
-                loaded.absorbed.extend(transmittance.iter().zip(behind).map(|(t, behind)| behind - t));
-            }
+            loaded.absorbed.resize(transmittance.len(), 0.0);
+            absorb(transmittance, behind, &mut loaded.absorbed);
             loaded.is_empty = loaded.phase.is_empty() && !is_nonzero(&loaded.absorbed);
+            let is_smooth = n == 1 && n < oversampling && behind.is_empty();
+            loaded.correction = match self.smooth.as_ref().filter(|_| is_smooth) {
+                Some(smooth) => {
+                    smooth.variance(&loaded.absorbed, width, &mut loaded.variance, &mut patch.padded);
+                    Correction::Added
+                }
+                None => {
+                    let amplitude = &mut patch.padded;
+                    amplitude.resize(transmittance.len(), 0.0);
+                    amplitudes(&loaded.absorbed, &loaded.behind, amplitude);
+                    if is_detailed(amplitude, width) { Correction::Products } else { Correction::None }
+                }
+            };
             (loaded.width, loaded.samples_per_pixel, loaded.at_px, loaded.fresh) = (width, n, at_px, 0);
         }
     }
@@ -273,7 +308,7 @@ impl PatchImager {
         assert!(is_own, "the patch or the focus belongs to another imager");
         let margin_px = focus_of(0).margin_px;
         let [width, height] = patch.size_px.map(|side| side + 2 * margin_px);
-        let PatchScratch { canvas: scratch, phases } = scratch;
+        let PatchScratch { canvas: scratch, phases, absorbed: corrected } = scratch;
         *factor = Factor { width, values: core::mem::take(&mut factor.values), margin_px, clipped: 0 };
         factor.values.clear();
         factor.values.resize(width * height, 0.0);
@@ -288,7 +323,7 @@ impl PatchImager {
             let columns = layer.width / layer.samples_per_pixel + 2 * margin_px;
             let rows = layer.absorbed.len() / layer.width / layer.samples_per_pixel + 2 * margin_px;
             let has_phase = !layer.phase.is_empty();
-            let PaddedSpectra { canvas, spectra, .. } = self.padded_spectra(layer, focus, scratch);
+            let PaddedSpectra { canvas, spectra, .. } = self.padded_spectra(layer, focus, corrected, scratch);
             let absorbed = &mut factor.values[y * width..(y + rows) * width];
             let phases = if has_phase { &mut phases[y * width..(y + rows) * width] } else { &mut [] };
             canvas.expose(
@@ -307,26 +342,39 @@ impl PatchImager {
         &self,
         layer: &'a mut LoadedLayer,
         focus: &Focus,
+        corrected: &mut Vec<f32>,
         scratch: &mut CanvasScratch,
     ) -> &'a mut PaddedSpectra {
         let LoadedLayer { absorbed, behind, phase, width, samples_per_pixel, padded, fresh, .. } = layer;
         let (width, n) = (*width, *samples_per_pixel);
-        let samples = Samples { absorbed, behind, phase, width, offset: focus.margin_px * n };
-        let cached = padded[..*fresh].iter().position(|entry| entry.margin_px == focus.margin_px);
+        let added = if layer.correction == Correction::Added { focus.filter.correction } else { 0.0 };
+        let is_same = |entry: &PaddedSpectra| entry.margin_px == focus.margin_px && entry.added == added;
+        let cached = padded[..*fresh].iter().position(is_same);
+        let mut samples = Samples { absorbed, behind, phase, width, offset: focus.margin_px * n };
+        if cached.is_none() && added > 0.0 {
+            corrected.clone_from(absorbed);
+            add_scaled(corrected, &layer.variance, added as f32);
+            samples.absorbed = corrected;
+        }
         let index = cached.unwrap_or_else(|| {
             let canvas = self.canvas([width / n, absorbed.len() / width / n], n, focus.margin_px);
             if padded.len() == *fresh {
-                padded.push(PaddedSpectra { margin_px: 0, canvas: Arc::clone(&canvas), spectra: Spectra::default() });
+                padded.push(PaddedSpectra {
+                    margin_px: 0,
+                    added,
+                    canvas: Arc::clone(&canvas),
+                    spectra: Spectra::default(),
+                });
             }
             let entry = &mut padded[*fresh];
-            entry.margin_px = focus.margin_px;
+            (entry.margin_px, entry.added) = (focus.margin_px, added);
             entry.canvas = canvas;
             *fresh += 1;
             entry.canvas.load(samples, &mut entry.spectra, scratch);
             *fresh - 1
         });
         let entry = &mut padded[index];
-        if focus.filter.is_corrected {
+        if focus.filter.is_corrected() && layer.correction == Correction::Products {
             entry.canvas.correct(&self.in_focus, samples, &mut entry.spectra, scratch);
         }
         entry
@@ -466,4 +514,20 @@ mod tests {
             assert_eq!(transfers.transfer(depth, stage), fresh().transfer(depth, stage));
         }
     }
+}
+
+/// Computes absorbed light T₀ − T, where T₀ is 1 if `behind` is empty.
+#[multiversion(targets = "simd")]
+fn absorb(transmittance: &[f32], behind: &[f32], absorbed: &mut [f32]) {
+    if behind.is_empty() {
+        absorbed.iter_mut().zip(transmittance).for_each(|(absorbed, t)| *absorbed = 1.0 - t);
+    } else {
+        let pairs = transmittance.iter().zip(behind);
+        absorbed.iter_mut().zip(pairs).for_each(|(absorbed, (t, behind))| *absorbed = behind - t);
+    }
+}
+
+#[multiversion(targets = "simd")]
+fn add_scaled(values: &mut [f32], others: &[f32], factor: f32) {
+    values.iter_mut().zip(others).for_each(|(value, other)| *value += factor * other);
 }

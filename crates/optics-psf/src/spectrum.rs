@@ -319,7 +319,7 @@ fn split(spectra: &[Lanes], pixels: Pixels, turned: &mut [Lanes], padded: usize,
         let (plus, minus) = rows.split_at_mut(padded);
         let ky = |l: usize| (block * LANES + l).min(height - 1);
         let above = |l: usize| &spectra[ky(l)];
-        let below = |l: usize| &spectra[(height - ky(l)) % height];
+        let below = |l: usize| &spectra[if ky(l) == 0 { 0 } else { height - ky(l) }];
         match pixels {
             Pixels::Complex => {
                 store(turned_rows(above), &mut plus[left..left + LANES]);

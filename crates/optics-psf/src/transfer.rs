@@ -9,7 +9,7 @@ use crate::overlap::OverlapIntegral;
 use crate::pupil::Pupil;
 
 /// Samples from frequency 0 to the cutoff; the error of linear interpolation is below 6e-4.
-const SAMPLES: usize = 401;
+pub(crate) const SAMPLES: usize = 401;
 /// Samples per direction, and directions, for asymmetric pupils.
 pub(crate) const ASYMMETRIC_SAMPLES: usize = 129;
 const DIRECTIONS: usize = 64;

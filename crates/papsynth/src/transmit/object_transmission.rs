@@ -32,9 +32,32 @@ pub(super) struct Window {
 #[derive(Debug, Default)]
 pub(super) struct ObjectTransmission {
     pub(super) layers: Vec<TransmissionLayer>,
-    /// Buffers for the absorbance or the amounts of dyes.
-    amounts: [Vec<f32>; DYES],
+    buffers: MixerBuffers,
 }
+
+/// The absorbance at one wavelength as a negative number, or the amounts of dyes; empty planes stand for zero.
+type AmountPlanes = [Vec<f32>; DYES];
+
+/// Working memory of [`DyeMixer`].
+#[derive(Debug, Default)]
+struct MixerBuffers {
+    amounts: AmountPlanes,
+    deviations: AmountPlanes,
+    steep: SteepSamples,
+}
+
+/// Samples within which amounts vary.
+#[derive(Debug, Default)]
+struct SteepSamples {
+    places: Vec<u32>,
+    /// Amounts above the mean of all samples, then those below.
+    amounts: AmountPlanes,
+    transmittance: Vec<Vec<f32>>,
+}
+
+/// Standard deviation of the absorbance within a sample up to which the transmittance of the mean is used. The error is
+/// below 3e-4 of the light.
+const STEEP: f32 = 0.01;
 
 /// Pieces of an object that are sampled at the same distance.
 #[derive(Debug, Default)]
@@ -141,7 +164,7 @@ impl DyeMixer {
     /// Computes the transmittance and phase delay of an object in a window, layer by layer. A camera pixel has `n` grid
     /// points along each axis.
     pub(super) fn compose(&self, pieces: &[Piece], window: Window, n: usize, transmission: &mut ObjectTransmission) {
-        let ObjectTransmission { layers, amounts } = transmission;
+        let ObjectTransmission { layers, buffers } = transmission;
         let mut steps: Vec<usize> = pieces.iter().map(|piece| piece.step).collect();
         steps.sort_unstable_by(|a, b| b.cmp(a));
         steps.dedup();
@@ -157,12 +180,12 @@ impl DyeMixer {
             if index > 0 {
                 let coarser = |least: usize| pieces.iter().filter(move |piece| piece.step >= least);
                 let tiles: Vec<_> = coarser(step).map(|piece| (piece, resampled(piece, step, on))).collect();
-                self.transmittance(&tiles, on, &mut layer.transmittance, amounts);
+                self.transmittance(&tiles, on, &mut layer.transmittance, &mut buffers.amounts);
                 let tiles: Vec<_> = tiles.into_iter().filter(|(piece, _)| piece.step > step).collect();
-                self.transmittance(&tiles, on, &mut layer.behind, amounts);
+                self.transmittance(&tiles, on, &mut layer.behind, &mut buffers.amounts);
                 continue;
             }
-            let tiles = self.coarsest(&own().collect::<Vec<_>>(), on, layer, amounts);
+            let tiles = self.coarsest(&own().collect::<Vec<_>>(), on, layer, buffers);
             let finer = pieces.iter().filter(|piece| piece.step < step && piece.phase_rad != 0.0);
             let finer: Vec<_> = finer.map(|piece| (piece, resampled(piece, step, on))).collect();
             for (piece, tile) in tiles.iter().chain(&finer).filter(|(piece, _)| piece.phase_rad != 0.0) {
@@ -178,30 +201,33 @@ impl DyeMixer {
         pieces: &[&'a Piece],
         window: Window,
         layer: &mut TransmissionLayer,
-        amounts: &mut [Vec<f32>; DYES],
+        buffers: &mut MixerBuffers,
     ) -> Vec<(&'a Piece, Cow<'a, Tile>)> {
         let own = || pieces.iter().copied();
         let step = own().map(|piece| piece.step).max().unwrap_or(1);
+        let MixerBuffers { amounts, deviations, steep } = buffers;
         if step == 1 {
             let tiles: Vec<_> = own().map(|piece| (piece, Cow::Borrowed(&piece.absorbance))).collect();
             self.transmittance(&tiles, window, &mut layer.transmittance, amounts);
             return tiles;
         }
+        let moments = own().map(|piece| {
+            let [mean, deviation] = piece.absorbance.moments_within_pixels(step);
+            ((piece, Cow::Owned(mean)), (piece, Cow::Owned(deviation)))
+        });
+        let (means, of_deviations): (Vec<_>, Vec<_>) = moments.unzip();
+        self.transmittance(&means, window, &mut layer.transmittance, amounts);
+        self.amounts(&of_deviations, window, deviations);
         // T(A) is not linear: the mean of its values at the mean ± the deviation of A approximates that of a sample.
-        let moments: Vec<_> = own().map(|piece| piece.absorbance.moments_within_pixels(step)).collect();
-        let mut others = Vec::new();
-        for (sign, transmittance) in [(1.0, &mut layer.transmittance), (-1.0, &mut others)] {
-            let tiles = own().zip(&moments).map(|(piece, [mean, deviation])| {
-                let pairs = mean.values.iter().zip(&deviation.values);
-                let values = pairs.map(|(mean, deviation)| mean + sign * deviation).collect();
-                (piece, Cow::Owned(Tile { values, ..*mean }))
-            });
-            self.transmittance(&tiles.collect::<Vec<_>>(), window, transmittance, amounts);
+        steep.find(amounts, deviations);
+        self.transmit(&steep.amounts, 2 * steep.places.len(), &mut steep.transmittance);
+        for (transmittance, found) in layer.transmittance.iter_mut().zip(&steep.transmittance) {
+            let (above, below) = found.split_at(steep.places.len());
+            for ((place, above), below) in steep.places.iter().zip(above).zip(below) {
+                transmittance[*place as usize] = 0.5 * (above + below);
+            }
         }
-        for (transmittance, other) in layer.transmittance.iter_mut().zip(&others) {
-            average(transmittance, other);
-        }
-        own().zip(moments).map(|(piece, [mean, _])| (piece, Cow::Owned(mean))).collect()
+        means
     }
 
     /// Computes the transmittance of tiles of the same sampling in each channel.
@@ -210,10 +236,15 @@ impl DyeMixer {
         tiles: &[(&Piece, Cow<'_, Tile>)],
         window: Window,
         transmittance: &mut Vec<Vec<f32>>,
-        amounts: &mut [Vec<f32>; DYES],
+        amounts: &mut AmountPlanes,
     ) {
+        self.amounts(tiles, window, amounts);
+        self.transmit(amounts, window.width * window.height, transmittance);
+    }
+
+    /// Adds the amounts of tiles of the same sampling.
+    fn amounts(&self, tiles: &[(&Piece, Cow<'_, Tile>)], window: Window, amounts: &mut AmountPlanes) {
         let samples = window.width * window.height;
-        transmittance.resize(self.channels(), Vec::new());
         match self {
             Self::Monochrome(wavelength) => {
                 let [absorbance, ..] = amounts;
@@ -222,12 +253,8 @@ impl DyeMixer {
                     let strength = dye_spectra::absorbance(&piece.dyes, *wavelength) as f32;
                     add(absorbance, window, tile, -strength);
                 }
-                // Beer and Lambert: T = 10^(−A).
-                let [transmittance] = &mut transmittance[..] else { return };
-                clear(transmittance, samples);
-                exp10_from(absorbance, transmittance);
             }
-            Self::Colour(colour) => {
+            Self::Colour(_) => {
                 for (dye, amount) in amounts.iter_mut().enumerate() {
                     amount.clear();
                     // A dye without amounts needs no plane.
@@ -238,11 +265,26 @@ impl DyeMixer {
                         add(amount, window, tile, piece.dyes[dye] as f32);
                     }
                 }
+            }
+        }
+    }
+
+    /// Computes the transmittance of amounts in each channel.
+    fn transmit(&self, amounts: &AmountPlanes, samples: usize, transmittance: &mut Vec<Vec<f32>>) {
+        transmittance.resize(self.channels(), Vec::new());
+        match self {
+            // Beer and Lambert: T = 10^(−A).
+            Self::Monochrome(_) => {
+                let [transmittance] = &mut transmittance[..] else { return };
+                clear(transmittance, samples);
+                exp10_from(&amounts[0], transmittance);
+            }
+            Self::Colour(colour) => {
                 for channel in transmittance.iter_mut() {
                     channel.resize(samples, 0.0);
                 }
                 let [r, g, b] = &mut transmittance[..] else { return };
-                let [h, e, l, o, n] = &*amounts;
+                let [h, e, l, o, n] = amounts;
                 colour.transmittance_into([h, e, l, o, n], [r, g, b]);
             }
         }
@@ -261,6 +303,41 @@ impl DyeMixer {
     }
 }
 
+impl SteepSamples {
+    /// Finds the samples in which the sum of deviations is large, and collects their amounts.
+    fn find(&mut self, amounts: &AmountPlanes, deviations: &AmountPlanes) {
+        let Self { places, amounts: own, .. } = self;
+        places.clear();
+        let samples = deviations.iter().map(Vec::len).max().unwrap_or(0);
+        let planes: Vec<&[f32]> = deviations.iter().filter(|plane| !plane.is_empty()).map(Vec::as_slice).collect();
+        for first in (0..samples).step_by(BLOCK) {
+            let mut sums = [0.0_f32; BLOCK];
+            for plane in &planes {
+                sums.iter_mut().zip(&plane[first..]).for_each(|(sum, deviation)| *sum += deviation.abs());
+            }
+            if sums.iter().fold(false, |steep, sum| steep | (*sum > STEEP)) {
+                let steep = sums.iter().enumerate().filter(|(_, sum)| **sum > STEEP);
+                places.extend(steep.map(|(i, _)| (first + i) as u32));
+            }
+        }
+        for ((own, amounts), deviations) in own.iter_mut().zip(amounts).zip(deviations) {
+            own.clear();
+            if amounts.is_empty() || places.is_empty() {
+                continue;
+            }
+            for sign in [1.0, -1.0] {
+                own.extend(places.iter().map(|place| {
+                    let deviation = deviations.get(*place as usize).copied().unwrap_or(0.0);
+                    amounts[*place as usize] + sign * deviation
+                }));
+            }
+        }
+    }
+}
+
+/// Samples that are compared together.
+const BLOCK: usize = 16;
+
 /// Returns the absorbance of a piece sampled at another distance, at least in a window.
 fn resampled(piece: &Piece, step: usize, window: Window) -> Cow<'_, Tile> {
     let tile = &piece.absorbance;
@@ -276,11 +353,6 @@ fn resampled(piece: &Piece, step: usize, window: Window) -> Cow<'_, Tile> {
             Cow::Owned(part.refined(factor))
         }
     }
-}
-
-#[multiversion(targets = "simd")]
-fn average(values: &mut [f32], others: &[f32]) {
-    values.iter_mut().zip(others).for_each(|(value, other)| *value = 0.5 * (*value + other));
 }
 
 /// Samples around a window that interpolation uses.
