@@ -1,7 +1,9 @@
 use core::f64::consts::PI;
 use std::sync::OnceLock;
 
-use crate::pupil::{Pupil, turn};
+use multiversion::multiversion;
+
+use crate::pupil::{Pupil, RoundWaves, turn};
 
 /// Integral over the overlap of the condenser's disc with the objective's disc, shifted by a frequency:
 ///
@@ -13,9 +15,9 @@ use crate::pupil::{Pupil, turn};
 #[derive(Debug, Default)]
 pub(crate) struct OverlapIntegral {
     /// Coordinates and weights of the nodes.
-    x: Vec<f64>,
-    y: Vec<f64>,
-    weight: Vec<f64>,
+    x: Vec<f32>,
+    y: Vec<f32>,
+    weight: Vec<f32>,
 }
 
 /// Nodes along f: a minimum, and the number per fringe.
@@ -39,10 +41,31 @@ impl OverlapIntegral {
         self.segment(pupil, f, direction, -inner, split);
         self.segment(pupil, f, direction, right, split);
         let area = PI * inner * inner;
-        sum(pupil, f, direction, &self.x, &self.y, &self.weight).map(|part| part / area)
+        let sum = if pupil.is_round() { self.sum_round(pupil, f) } else { self.sum(pupil, f, direction) };
+        sum.map(|part| part / area)
+    }
+
+    fn sum(&self, pupil: &Pupil, f: f64, direction: [f64; 2]) -> [f64; 2] {
+        let mut total = [0.0; 2];
+        for ((&x, &y), &w) in self.x.iter().zip(&self.y).zip(&self.weight) {
+            let [x, y, w] = [x, y, w].map(f64::from);
+            let (c, s) = turn(waves(pupil, direction, x + f, y) - waves(pupil, direction, x, y));
+            total = [total[0] + w * c, total[1] + w * s];
+        }
+        total
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "phases in single precision")]
+    fn sum_round(&mut self, pupil: &Pupil, f: f64) -> [f64; 2] {
+        for list in [&mut self.x, &mut self.y, &mut self.weight] {
+            list.resize(list.len().next_multiple_of(LANES), 0.0);
+        }
+        let (x, y, weight) = (self.x.as_chunks().0, self.y.as_chunks().0, self.weight.as_chunks().0);
+        sum_blocks(&pupil.single_precision(), f as f32, x, y, weight)
     }
 
     /// Adds the nodes of the part between a pointed end and the split.
+    #[expect(clippy::cast_possible_truncation, reason = "nodes in single precision")]
     fn segment(&mut self, pupil: &Pupil, f: f64, direction: [f64; 2], end: f64, split: f64) {
         let half_height = |x: f64| {
             let (inner, outer) = (pupil.condenser, pupil.objective);
@@ -63,12 +86,13 @@ impl OverlapIntegral {
             let weight = 2.0 * width.abs() * t * w;
             let height = half_height(x);
             let axis = difference(x, 0.0);
-            let fringes = (difference(x, height) - axis).abs() + (difference(x, -height) - axis).abs();
+            let above = (difference(x, height) - axis).abs();
+            let below = if pupil.is_round() { above } else { (difference(x, -height) - axis).abs() };
+            let fringes = above + below;
             // The upper half of an even rule covers 0..1 of the half height.
             let across = quadrature_rule(node_count(fringes, ACROSS) * 2);
             for &[u, v] in &across[across.len() / 2..] {
-                let y = height * (2.0 * u - 1.0);
-                let weight = weight * 2.0 * height * v;
+                let [x, y, weight] = [x, height * (2.0 * u - 1.0), weight * 2.0 * height * v].map(|value| value as f32);
                 if pupil.is_round() {
                     self.x.push(x);
                     self.y.push(y);
@@ -120,42 +144,45 @@ fn waves(pupil: &Pupil, [c, s]: [f64; 2], x: f64, y: f64) -> f64 {
     pupil.waves([c * x - s * y, s * x + c * y])
 }
 
-fn sum(pupil: &Pupil, f: f64, direction: [f64; 2], x: &[f64], y: &[f64], weight: &[f64]) -> [f64; 2] {
-    if pupil.is_round() {
-        return sum_round(pupil, f, x, y, weight);
+/// Parallel partial sums: their order is the same for every instruction set.
+const LANES: usize = 16;
+
+#[multiversion(targets = "simd")]
+fn sum_blocks(waves: &RoundWaves, f: f32, x: &[[f32; LANES]], y: &[[f32; LANES]], weight: &[[f32; LANES]]) -> [f64; 2] {
+    let mut sums = [[0.0_f32; LANES]; 2];
+    for ((x, y), weight) in x.iter().zip(y).zip(weight) {
+        let (mut shifted, mut at) = ([0.0; LANES], [0.0; LANES]);
+        for l in 0..LANES {
+            at[l] = x[l] * x[l] + y[l] * y[l];
+            shifted[l] = at[l] + f * (2.0 * x[l] + f);
+        }
+        let (shifted, at) = (waves.at(&shifted), waves.at(&at));
+        for l in 0..LANES {
+            let (c, s) = turn_f32(shifted[l] - at[l]);
+            sums[0][l] += weight[l] * c;
+            sums[1][l] += weight[l] * s;
+        }
     }
-    let mut total = [0.0; 2];
-    for ((&x, &y), &w) in x.iter().zip(y).zip(weight) {
-        let (c, s) = turn(waves(pupil, direction, x + f, y) - waves(pupil, direction, x, y));
-        total[0] += w * c;
-        total[1] += w * s;
-    }
-    total
+    sums.map(|lanes| lanes.into_iter().map(f64::from).sum())
 }
 
-/// Parallel partial sums: their order is the same for every instruction set.
-const LANES: usize = 8;
-
-#[multiversion::multiversion(targets = "simd")]
-fn sum_round(pupil: &Pupil, f: f64, x: &[f64], y: &[f64], weight: &[f64]) -> [f64; 2] {
-    let mut lanes = [[0.0; LANES]; 2];
-    let mut add = |x: &[f64; LANES], y: &[f64; LANES], weight: &[f64; LANES]| {
-        for i in 0..LANES {
-            let q = x[i] * x[i] + y[i] * y[i];
-            let shifted = q + f * (2.0 * x[i] + f);
-            let (c, s) = turn(pupil.round_waves(shifted) - pupil.round_waves(q));
-            lanes[0][i] += weight[i] * c;
-            lanes[1][i] += weight[i] * s;
-        }
-    };
-    let whole = x.len() / LANES * LANES;
-    for i in (0..whole).step_by(LANES) {
-        let block = |list: &[f64]| core::array::from_fn(|k| list[i + k]);
-        add(&block(x), &block(y), &block(weight));
-    }
-    let rest = |list: &[f64]| core::array::from_fn(|k| list.get(whole + k).copied().unwrap_or(0.0));
-    add(&rest(x), &rest(y), &rest(weight));
-    lanes.map(|lane| lane.iter().sum())
+/// As [`turn`], with an error below 1e-6.
+#[inline(always)]
+fn turn_f32(x: f32) -> (f32, f32) {
+    /// Adding it rounds a number to an integer.
+    const WHOLE: f32 = 12_582_912.0;
+    let x = x - ((x + WHOLE) - WHOLE);
+    // x = quarter/4 + rest, |rest| <= 1/8.
+    let quarter = (4.0 * x + WHOLE) - WHOLE;
+    let t = core::f32::consts::TAU * (x - 0.25 * quarter);
+    let t2 = t * t;
+    let sin = t * (1.0 + t2 * (-1.0 / 6.0 + t2 * (1.0 / 120.0 + t2 * (-1.0 / 5040.0 + t2 / 362_880.0))));
+    let cos = 1.0 + t2 * (-0.5 + t2 * (1.0 / 24.0 + t2 * (-1.0 / 720.0 + t2 / 40_320.0)));
+    // As for double precision.
+    let half = quarter.abs() > 1.5;
+    let c = if half { -1.0 } else { 1.0 - quarter * quarter };
+    let s = if half { 0.0 } else { quarter };
+    (cos * c - sin * s, sin * c + cos * s)
 }
 
 #[cfg(test)]
@@ -180,6 +207,18 @@ mod tests {
             }
         }
         sum.map(|v| v / f64::from(rings * spokes))
+    }
+
+    #[test]
+    #[expect(clippy::cast_possible_truncation, reason = "single precision")]
+    fn single_precision_turns_match_cosine_and_sine() {
+        for i in -40_000..40_000 {
+            let x = (f64::from(i) * 1.23e-3) as f32;
+            let (c, s) = turn_f32(x);
+            let angle = core::f64::consts::TAU * f64::from(x);
+            assert!((f64::from(c) - libm::cos(angle)).abs() < 1e-6, "{x}");
+            assert!((f64::from(s) - libm::sin(angle)).abs() < 1e-6, "{x}");
+        }
     }
 
     #[test]

@@ -175,7 +175,7 @@ impl PatchImager {
 
     /// Computes the imaging properties at a depth and stage position: see [`Microscope::transfer`].
     ///
-    /// Transfer functions are interpolated between a few depths, a quarter of a µm apart. Each takes about 0.3 ms and
+    /// Transfer functions are interpolated between a few depths, a third of a µm apart. Each takes about 0.1 ms and
     /// is cached per stage position; all else takes some 10 µs. The result does not depend on the state of the cache.
     ///
     /// # Errors
@@ -403,10 +403,10 @@ struct TransferCache {
 }
 
 /// Approximate samples per period.
-const SAMPLES_PER_PERIOD: f64 = 6.7;
+const SAMPLES_PER_PERIOD: f64 = 4.6;
 
 /// Interpolation nodes on each side of a depth.
-const SIDE: i64 = 3;
+const SIDE: i64 = 5;
 
 /// Largest number of cached table entries.
 const MOST_ENTRIES: usize = 1 << 20;

@@ -17,6 +17,7 @@ pub(crate) struct Pupil {
     pub(crate) condenser: f64,
     /// Optical paths: W = Σ t·γ.
     media: [OpticalPath; 4],
+    has_stage: bool,
     has_cover: bool,
     zernike: Zernike,
     has_zernike: bool,
@@ -42,6 +43,7 @@ impl Pupil {
             objective,
             condenser: (params.condenser_na / wavelength_um).min(objective),
             media,
+            has_stage: stage_um != 0.0,
             has_cover: cover != 0.0,
             zernike: params.zernike,
             has_zernike: params.zernike != Zernike::default(),
@@ -71,7 +73,11 @@ impl Pupil {
     /// Returns W of the rotationally symmetric terms.
     #[inline(always)]
     pub(crate) fn round_waves(&self, f2: f64) -> f64 {
-        let mut waves = self.media[0].waves(f2) + self.media[1].waves(f2);
+        let mut waves = self.media[0].waves(f2);
+        // Square roots take most of the time of a transfer function.
+        if self.has_stage {
+            waves += self.media[1].waves(f2);
+        }
         if self.has_cover {
             waves += self.media[2].waves(f2) + self.media[3].waves(f2);
         }
@@ -79,6 +85,20 @@ impl Pupil {
             waves += self.zernike.round_waves(f2 / (self.objective * self.objective));
         }
         waves
+    }
+
+    /// Returns W of the rotationally symmetric terms in single precision.
+    #[expect(clippy::cast_possible_truncation, reason = "single precision")]
+    pub(crate) fn single_precision(&self) -> RoundWaves {
+        let paths = self.media.map(|path| [path.length, path.k, path.k2].map(|value| value as f32));
+        let count = if self.has_cover { paths.len() } else { 1 + usize::from(self.has_stage) };
+        let rim2 = self.objective * self.objective;
+        let zernike = [0.0, 1.0, 4.0].map(|r2| if self.has_zernike { self.zernike.round_waves(r2) } else { 0.0 });
+        // The parabola a r² + b r⁴ through the values at 0, 1 and 4.
+        let [one, four] = [zernike[1] - zernike[0], zernike[2] - zernike[0]];
+        let b = (four - 4.0 * one) / 12.0;
+        let powers = [(one - b) / rim2, b / (rim2 * rim2)].map(|value| value as f32);
+        RoundWaves { paths, count, powers }
     }
 
     /// Returns the complete W at a frequency.
@@ -109,6 +129,34 @@ impl Pupil {
     /// Returns the slope |dW/df| of the media at the condenser's rim: the lateral displacement of its rays, in µm.
     pub(crate) fn cone_radius(&self) -> f64 {
         (self.media[0].slope(self.condenser) + self.media[1].slope(self.condenser)).abs()
+    }
+}
+
+/// W of the rotationally symmetric terms, except a constant.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RoundWaves {
+    /// Length, k and k² of each path.
+    paths: [[f32; 3]; 4],
+    /// Number of paths that are used.
+    count: usize,
+    /// Factors of f² and f⁴.
+    powers: [f32; 2],
+}
+
+impl RoundWaves {
+    /// Returns W at squared frequencies.
+    #[inline(always)]
+    pub(crate) fn at<const N: usize>(&self, f2: &[f32; N]) -> [f32; N] {
+        let mut waves = [0.0; N];
+        for (wave, f2) in waves.iter_mut().zip(f2) {
+            *wave = *f2 * (self.powers[0] + self.powers[1] * *f2);
+        }
+        for &[length, k, k2] in &self.paths[..self.count] {
+            for (wave, f2) in waves.iter_mut().zip(f2) {
+                *wave += length * ((k2 - *f2).max(0.0).sqrt() - k);
+            }
+        }
+        waves
     }
 }
 

@@ -84,10 +84,8 @@ impl Transfer {
     pub(crate) fn mixed(parts: &[(Arc<Self>, f64)]) -> Self {
         let mut table = vec![[[0.0; 2]; 2]; parts[0].0.table.len()];
         for (part, weight) in parts {
-            let sums = table.as_flattened_mut().as_flattened_mut().iter_mut();
-            for (sum, value) in sums.zip(part.table.as_flattened().as_flattened()) {
-                *sum += weight * value;
-            }
+            let sums = table.as_flattened_mut().as_flattened_mut();
+            add_scaled(sums, part.table.as_flattened().as_flattened(), *weight);
         }
         Self { step: parts[0].0.step, table }
     }
@@ -144,6 +142,11 @@ impl Transfer {
         }
         mixed
     }
+}
+
+#[multiversion(targets = "simd")]
+fn add_scaled(sums: &mut [f64], values: &[f64], factor: f64) {
+    sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += factor * value);
 }
 
 /// Polynomial nodes of a section of a profile: a minimum, and the number per fringe.
