@@ -7,6 +7,7 @@ mod assets;
 mod cell;
 mod cell_context;
 mod chromatin;
+mod coverage;
 mod interpolation;
 pub(crate) mod noise_fields;
 mod nucleus;
