@@ -4,6 +4,7 @@
 //! and on the random streams of that object.
 
 mod assets;
+pub(crate) mod box_sums;
 mod cell;
 mod cell_context;
 mod chromatin;
