@@ -25,6 +25,9 @@ const MIN_PROJECTED_AREA: f64 = 1e-6;
 
 /// Rows that are integrated at once.
 const ROWS_AT_ONCE: usize = 4;
+/// Rows of a band, a multiple of [`ROWS_AT_ONCE`]. The image is drawn band by band, because the steps of a large image
+/// do not fit into the cache.
+const BAND: usize = 64;
 
 /// Coefficients of the thickness p₀ + p₁ x + p₂ y.
 type Plane = [f64; 3];
@@ -76,16 +79,29 @@ impl Sheet {
         let greatest = density.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
         let mut planes = vec![[0.0; 3]; self.triangles.len()];
         fill_planes(&mut planes, &self.triangles, &places, &density);
+        let count = rows.len().div_ceil(BAND);
+        let numbers: Vec<usize> = places.iter().map(|place| band_of(*place, count)).collect();
+        let mut bands: Vec<Vec<&Edge>> = vec![Vec::with_capacity(2 * self.edges.len() / count); count];
+        for edge in self.edges.iter() {
+            let [a, b] = edge.ends.map(|v| numbers[v as usize]);
+            bands[a.min(b)..=a.max(b)].iter_mut().for_each(|band| band.push(edge));
+        }
         // One more column holds the remainder beyond the row.
         let stride = columns.len() + 1;
-        let mut sums = vec![[0.0; 2]; stride * rows.len().next_multiple_of(ROWS_AT_ONCE)];
-        sweep(&mut sums[..stride * rows.len()], stride, &self.edges, &places, &planes);
+        let mut sums = vec![[0.0; 2]; stride * BAND.min(rows.len().next_multiple_of(ROWS_AT_ONCE))];
         let mut lines = vec![0.0; ROWS_AT_ONCE * columns.len()];
-        let mut image = image[rows.start * width..rows.end * width].chunks_exact_mut(width);
-        for steps in sums.chunks_exact(ROWS_AT_ONCE * stride) {
-            integrate(&mut lines, steps, NEGLIGIBLE * greatest);
-            for (line, row) in lines.chunks_exact(columns.len()).zip(&mut image) {
-                add(&mut row[columns.clone()], line);
+        let image = image[rows.start * width..rows.end * width].chunks_mut(BAND * width);
+        for (number, (edges, image)) in bands.iter().zip(image).enumerate() {
+            let height = image.len() / width;
+            sweep(&mut sums[..stride * height], stride, (number * BAND) as f64, edges, &places, &planes);
+            let mut image = image.chunks_exact_mut(width);
+            for steps in sums[..stride * height.next_multiple_of(ROWS_AT_ONCE)].chunks_exact_mut(ROWS_AT_ONCE * stride)
+            {
+                integrate(&mut lines, steps, NEGLIGIBLE * greatest);
+                steps.fill([0.0; 2]);
+                for (line, row) in lines.chunks_exact(columns.len()).zip(&mut image) {
+                    add(&mut row[columns.clone()], line);
+                }
             }
         }
     }
@@ -127,6 +143,12 @@ impl Sheet {
             pixel(low, 0.0)..pixel(high, 1.0)
         })
     }
+}
+
+/// Returns the band of a point; points beyond the image are in the first or last band.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` saturates")]
+fn band_of(place: Point, bands: usize) -> usize {
+    (place[1] as usize / BAND).min(bands - 1)
 }
 
 #[multiversion(targets = "simd")]
@@ -333,11 +355,11 @@ impl EdgeBatch {
     }
 }
 
-/// Adds all edges. A triangle is the region right of its upward edges minus the region right of its downward edges.
-/// Each edge adds the difference of the planes of its two triangles.
+/// Adds edges to a band that begins at row `top`. A triangle is the region right of its upward edges minus the region
+/// right of its downward edges. Each edge adds the difference of the planes of its two triangles.
 #[multiversion(targets = "simd")]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixels of the image")]
-fn sweep(sums: &mut [Step], stride: usize, edges: &[Edge], places: &[Point], planes: &[Plane]) {
+fn sweep(sums: &mut [Step], stride: usize, top: f64, edges: &[&Edge], places: &[Point], planes: &[Plane]) {
     let size = [(stride - 1) as f64, (sums.len() / stride) as f64];
     let within = |p: Point| (0..2).all(|axis| p[axis] >= 0.0 && p[axis] < size[axis]);
     let mut batches = [const { EdgeBatch::EMPTY }; LENGTHS.0];
@@ -352,8 +374,8 @@ fn sweep(sums: &mut [Step], stride: usize, edges: &[Edge], places: &[Point], pla
     };
     for edge in edges {
         let [left, right] = edge.sides.map(|t| if t == OUTSIDE { [0.0; 3] } else { planes[t as usize] });
-        let [a, b] = edge.ends.map(|v| places[v as usize]);
-        let step = [right[0] - left[0], right[1] - left[1], right[2] - left[2]];
+        let [a, b] = edge.ends.map(|v| [places[v as usize][0], places[v as usize][1] - top]);
+        let step = [right[0] - left[0] + top * (right[2] - left[2]), right[1] - left[1], right[2] - left[2]];
         let (a, b, step) = if a[1] < b[1] {
             (a, b, step)
         } else if a[1] > b[1] {

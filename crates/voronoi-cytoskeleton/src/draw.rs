@@ -110,26 +110,39 @@ fn splat(
     let (dx, dy) = (single(d[0]), single(d[1]));
     let (from, growth) = (single(halves[0]), single(halves[1] - halves[0]));
 
+    let per_row = 1.0 / d[1];
     for row in pixels(a[1].min(b[1]) - reach, a[1].max(b[1]) + reach, height) {
         // The part of the segment within reach of this row bounds the columns.
         let y = row as f64;
-        let stretch = [y - reach, y + reach].map(|edge| ((edge - a[1]) / d[1]).clamp(0.0, 1.0));
+        let stretch = [y - reach, y + reach].map(|edge| ((edge - a[1]) * per_row).clamp(0.0, 1.0));
         let [s, t] = if d[1] == 0.0 { [0.0, 1.0] } else { stretch };
         let (left, right) = (a[0] + s * d[0], a[0] + t * d[0]);
         let columns = pixels(left.min(right) - reach, left.max(right) + reach, width);
 
         let py = single(y - a[1]);
-        let offset = single(columns.start as f64 - a[0]);
-        for (block, pixels) in image[row * width..][columns].chunks_mut(LANES).enumerate() {
+        for start in columns.clone().step_by(LANES) {
+            let offset = single(start as f64 - a[0]);
             let mut values = [0.0; LANES];
             for (i, drawn) in values.iter_mut().enumerate() {
-                let px = offset + (block * LANES + i) as f32;
+                let px = offset + i as f32;
                 let along = smaller(larger((px * dx + py * dy) * inverse, 0.0), 1.0);
                 let (ex, ey) = (px - along * dx, py - along * dy);
                 *drawn = value(ex * ex + ey * ey, from + along * growth);
             }
-            for (pixel, drawn) in pixels.iter_mut().zip(values) {
-                *pixel = larger(*pixel, drawn);
+            // Most rows end within a block.
+            let end = columns.end.min(start + LANES);
+            match image[row * width + start..].first_chunk_mut::<LANES>() {
+                Some(pixels) => {
+                    let count = (end - start) as f32;
+                    for (i, (pixel, drawn)) in pixels.iter_mut().zip(values).enumerate() {
+                        *pixel = larger(*pixel, if (i as f32) < count { drawn } else { f32::NEG_INFINITY });
+                    }
+                }
+                None => {
+                    for (pixel, drawn) in image[row * width + start..row * width + end].iter_mut().zip(values) {
+                        *pixel = larger(*pixel, drawn);
+                    }
+                }
             }
         }
     }

@@ -135,12 +135,13 @@ impl ObjectCanvas {
     }
 }
 
+/// Pixels computed together.
+const LANES: usize = 16;
+
 /// Draws a stroke: adds `added` and takes the maximum with `least` times its coverage, the fraction of a pixel that it
 /// covers, from the distance of the pixel centre to the edge.
 #[multiversion(targets = "simd")]
 fn draw(stroke: &Stroke, canvas: &mut ObjectCanvas, added: f32, least: f32) {
-    /// Pixels computed together.
-    const LANES: usize = 8;
     let (width, height) = (canvas.coverage.width, canvas.coverage.height());
     let [a, b] = stroke.ends.map(|end| [0, 1].map(|axis| end[axis] - canvas.coverage.origin[axis] as f64));
     let d = [b[0] - a[0], b[1] - a[1]];
@@ -153,37 +154,46 @@ fn draw(stroke: &Stroke, canvas: &mut ObjectCanvas, added: f32, least: f32) {
         let end = (to.floor() + 1.0).max(0.0) as usize;
         from.ceil().max(0.0) as usize..end.min(count)
     };
+    let per_row = 1.0 / d[1];
     for y in pixels(a[1].min(b[1]) - reach, a[1].max(b[1]) + reach, height) {
         // The part of the stroke within reach of this row bounds the columns.
         let py = y as f64 - a[1];
         let [s, t] = match d[1] {
             0.0 => [0.0, 1.0],
-            down => [py - reach, py + reach].map(|edge| (edge / down).clamp(0.0, 1.0)),
+            _ => [py - reach, py + reach].map(|edge| (edge * per_row).clamp(0.0, 1.0)),
         };
-        let (left, right) = (a[0] + s.min(t) * d[0], a[0] + s.max(t) * d[0]);
+        let (left, right) = (a[0] + s * d[0], a[0] + t * d[0]);
         let columns = pixels(left.min(right) - reach, left.max(right) + reach, width);
-        if columns.is_empty() {
-            continue;
-        }
-        let (first, py) = ((columns.start as f64 - a[0]) as f32, py as f32);
-        let row = y * width + columns.start..y * width + columns.end;
-        let covers = canvas.coverage.values[row.clone()].chunks_mut(LANES);
-        let values = canvas.absorbance.values[row].chunks_mut(LANES);
-        for (block, (covers, values)) in covers.zip(values).enumerate() {
+        let py = py as f32;
+        for start in columns.clone().step_by(LANES) {
+            let (first, left) = ((start as f64 - a[0]) as f32, (columns.end - start) as f32);
             let mut coverage = [0.0; LANES];
             for (i, coverage) in coverage.iter_mut().enumerate() {
-                let px = first + (block * LANES + i) as f32;
+                let px = first + i as f32;
                 let along = smaller(larger((px * dx + py * dy) * inverse, 0.0), 1.0);
                 let (ex, ey) = (px - along * dx, py - along * dy);
                 let half = half + along * growth;
                 let depth = half - (ex * ex + ey * ey).sqrt();
-                *coverage = smaller(larger(depth + 0.5, 0.0), smaller(2.0 * half, 1.0));
+                let covered = smaller(larger(depth + 0.5, 0.0), smaller(2.0 * half, 1.0));
+                // Pixels beyond the columns may be in the next row.
+                *coverage = if (i as f32) < left { covered } else { 0.0 };
             }
-            for ((cover, value), coverage) in covers.iter_mut().zip(values).zip(coverage) {
-                *cover = larger(*cover, coverage);
-                *value = larger(*value + added * coverage, least * coverage);
+            let at = y * width + start;
+            let covers = &mut canvas.coverage.values[at..];
+            let values = &mut canvas.absorbance.values[at..];
+            match (covers.first_chunk_mut::<LANES>(), values.first_chunk_mut::<LANES>()) {
+                (Some(covers), Some(values)) => paint(covers, values, &coverage, added, least),
+                _ => paint(covers, values, &coverage, added, least),
             }
         }
+    }
+}
+
+#[inline(always)]
+fn paint(covers: &mut [f32], values: &mut [f32], coverage: &[f32], added: f32, least: f32) {
+    for ((cover, value), &coverage) in covers.iter_mut().zip(values).zip(coverage) {
+        *cover = larger(*cover, coverage);
+        *value = larger(*value + added * coverage, least * coverage);
     }
 }
 

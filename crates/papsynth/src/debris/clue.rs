@@ -3,7 +3,10 @@
 //! The coat of bacteria is part of its cell: it follows the outline and folds of the cell and has its depth. The row of
 //! the cell in the ground truth has the trait `clue`.
 
+use multiversion::multiversion;
+
 use super::prelude::*;
+use crate::phantom::box_sums::for_each_row_of_sums;
 use crate::scene::view::FieldNumbers;
 
 section! {
@@ -42,17 +45,17 @@ impl ClueCells {
 const PATCH_UM: f64 = 3.0;
 
 /// Density of a coat between its patches, relative to the patches.
-const THIN: f64 = 0.08;
+const THIN: f32 = 0.08;
 /// Density along the rim, relative to the patches.
-const RIM: f64 = 0.5;
+const RIM: f32 = 0.5;
 
 /// Increase of density from the border of a patch inwards, per standard deviation of the noise field.
-const SOFT: f64 = 1.2;
+const SOFT: f32 = 1.2;
 
 /// Size (standard deviation) of the tufts beyond the rim, µm.
 const TUFT_UM: f64 = 0.8;
 /// Density between the tufts, relative to them.
-const TUFTED: f64 = 0.15;
+const TUFTED: f32 = 0.15;
 
 /// Distance over which the density increases towards the rim, µm.
 const RIM_UM: f64 = 2.0;
@@ -78,18 +81,12 @@ pub(crate) fn add_coat(coat: &Coat, context: &ObjectContext<'_>, phantom: &mut P
     let threshold = noise_fields.clouds().quantile(1.0 - coat.coverage);
     let sampler = FieldSampler::clouds(PATCH_UM / pixel_um, &mut rng);
     let width = canvas.coverage.width;
-    let mut density = vec![0.0_f64; canvas.coverage.values.len()];
+    let mut density = tufted;
     let mut row = 0;
     canvas.rows(noise_fields.clouds(), &sampler, |_, _, _, field| {
-        for (x, patch) in field.iter().enumerate() {
-            let at = row * width + x;
-            let covered = f64::from(inside.values[at]);
-            let patchy = (0.5 + SOFT * f64::from(*patch - threshold)).clamp(THIN, 1.0);
-            let at_rim = RIM * (2.0 * (1.0 - f64::from(rim.values[at]))).min(1.0);
-            let outside = (2.0 * f64::from(beyond.values[at])).min(1.0);
-            let tuft = (TUFTED + (1.0 - TUFTED) * f64::from(tufted[at])).clamp(0.0, 1.0);
-            density[at] = covered * (patchy + at_rim).min(1.0) + (1.0 - covered) * outside * tuft * patchy.max(RIM);
-        }
+        let here = row * width..(row + 1) * width;
+        let covers = [&inside, &rim, &beyond].map(|tile| &tile.values[here.clone()]);
+        to_density(&mut density[here], field, threshold, covers);
         row += 1;
     });
     let origin = canvas.coverage.origin.map(|at| at as f64);
@@ -98,7 +95,7 @@ pub(crate) fn add_coat(coat: &Coat, context: &ObjectContext<'_>, phantom: &mut P
     let half_width = 0.5 * coat.width_um / pixel_um;
     for _ in 0..tries {
         let (x, y) = (random::below(width, &mut rng), random::below(height, &mut rng));
-        if !random::chance(density[y * width + x], &mut rng) {
+        if !random::chance(f64::from(density[y * width + x]), &mut rng) {
             continue;
         }
         let at = [x as f64 + origin[0] + random::uniform(&mut rng), y as f64 + origin[1] + random::uniform(&mut rng)];
@@ -108,6 +105,21 @@ pub(crate) fn add_coat(coat: &Coat, context: &ObjectContext<'_>, phantom: &mut P
     }
     *phantom = core::mem::take(phantom).with_inclusion(canvas.absorbance, context.dyes.bacillus);
     phantom.traits.push(Trait::Clue);
+}
+
+/// Replaces the noise field of the tufts in a row by the density of the coat. The others are the noise field of the
+/// patches, the coverage by the cell, and its means within the distances of the rim and of the overhang.
+#[multiversion(targets = "simd")]
+fn to_density(tufts: &mut [f32], patches: &[f32], threshold: f32, [inside, rim, beyond]: [&[f32]; 3]) {
+    let within = |value: f32, low: f32| value.max(low).min(1.0);
+    let rows = tufts.iter_mut().zip(patches).zip(inside).zip(rim).zip(beyond);
+    for ((((value, patch), covered), rim), beyond) in rows {
+        let patchy = within(0.5 + SOFT * (patch - threshold), THIN);
+        let at_rim = RIM * (2.0 * (1.0 - rim)).min(1.0);
+        let outside = (2.0 * beyond).min(1.0);
+        let tuft = within(TUFTED + (1.0 - TUFTED) * *value, 0.0);
+        *value = covered * (patchy + at_rim).min(1.0) + (1.0 - covered) * outside * tuft * patchy.max(RIM);
+    }
 }
 
 /// Copies a tile to a blank tile of the size and position of a larger one.
@@ -122,34 +134,13 @@ fn widened(tile: &Tile, place: &Tile) -> Tile {
 
 /// Returns the mean over squares of 2·radius + 1 pixels.
 fn averaged(tile: &Tile, radius: usize) -> Tile {
-    let (width, height) = (tile.width, tile.height());
-    let weight = 1.0 / (2 * radius + 1) as f32;
-    let mut across = tile.blank();
-    for (out, row) in across.values.chunks_exact_mut(width).zip(tile.values.chunks_exact(width)) {
-        let mut sum: f32 = row.iter().take(radius).sum();
-        for (x, out) in out.iter_mut().enumerate() {
-            sum += row.get(x + radius).unwrap_or(&0.0);
-            sum -= x.checked_sub(radius + 1).map_or(0.0, |x| row[x]);
-            *out = weight * sum;
-        }
-    }
-    let mut out = tile.blank();
-    let mut sums = vec![0.0; width];
-    let add = |sums: &mut [f32], y: usize, sign: f32| {
-        let row = &across.values[y * width..][..width];
-        sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += sign * value);
-    };
-    (0..radius.min(height)).for_each(|y| add(&mut sums, y, 1.0));
-    for (y, row) in out.values.chunks_exact_mut(width).enumerate() {
-        if y + radius < height {
-            add(&mut sums, y + radius, 1.0);
-        }
-        if y > radius {
-            add(&mut sums, y - radius - 1, -1.0);
-        }
-        row.iter_mut().zip(&sums).for_each(|(value, sum)| *value = (weight * sum).clamp(0.0, 1.0));
-    }
-    out
+    let side = (2 * radius + 1) as f32;
+    let weight = 1.0 / (side * side);
+    let mut values = Vec::with_capacity(tile.values.len());
+    for_each_row_of_sums(tile, radius, |sums| {
+        values.extend(sums.iter().map(|sum| (weight * sum).clamp(0.0, 1.0)));
+    });
+    Tile { values, ..*tile }
 }
 
 #[cfg(test)]

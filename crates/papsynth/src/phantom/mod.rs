@@ -4,9 +4,11 @@
 //! and on the random streams of that object.
 
 mod assets;
+pub(crate) mod box_sums;
 mod cell;
 mod cell_context;
 mod chromatin;
+mod coverage;
 mod interpolation;
 pub(crate) mod noise_fields;
 mod nucleus;

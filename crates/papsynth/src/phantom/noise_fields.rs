@@ -41,10 +41,16 @@ pub(crate) struct NoiseFields<'a> {
 /// A periodic field.
 #[derive(Debug)]
 pub(crate) struct NoiseField {
-    values: Vec<f32>,
+    /// Panels of [`PANEL`] columns, one after the other. In a panel, the next row follows in memory, so that the memory
+    /// that the next row of an object needs is loaded in advance. In units of `unit`, which halves the memory.
+    values: Vec<i16>,
+    unit: f32,
     /// A subset of the values in ascending order, for quantiles.
     ranked: Vec<f32>,
 }
+
+/// Columns of a panel of a noise field.
+const PANEL: usize = 64;
 
 /// Buffer for a row of texels; the first texel may be repeated after the last.
 pub(crate) type Texels = [f32; SIDE + 1];
@@ -113,6 +119,11 @@ impl FieldSampler {
         Self { origin, step: [step(1), step(2)] }
     }
 
+    /// Returns the sampler on a grid of pixels `n` times as large.
+    pub(crate) fn coarser(&self, n: f64) -> Self {
+        Self { step: self.step.map(|step| n * step), ..*self }
+    }
+
     /// Draws a sampler for flecks and grain, with the physical texel size.
     pub(crate) fn fine<R: Rng + ?Sized>(pixel_um: f64, rng: &mut R) -> Self {
         Self::new(TEXEL_UM / pixel_um, rng)
@@ -130,7 +141,15 @@ impl NoiseField {
         const STRIDE: usize = 61;
         let mut ranked: Vec<f32> = values.iter().step_by(STRIDE).copied().collect();
         ranked.sort_by(f32::total_cmp);
-        Self { values, ranked }
+        let greatest = values.iter().fold(f32::MIN_POSITIVE, |greatest, value| greatest.max(value.abs()));
+        let per_unit = f32::from(i16::MAX) / greatest;
+        let mut panels = vec![0; values.len()];
+        for (y, row) in values.chunks_exact(SIDE).enumerate() {
+            for (panel, row) in row.chunks_exact(PANEL).enumerate() {
+                round(&mut panels[(panel * SIDE + y) * PANEL..][..PANEL], row, per_unit);
+            }
+        }
+        Self { values: panels, unit: 1.0 / per_unit, ranked }
     }
 
     /// Returns the value below which a fraction of the field lies.
@@ -140,21 +159,31 @@ impl NoiseField {
         self.ranked.get(rank).copied().unwrap_or(0.0)
     }
 
+    /// Interpolates between two rows, from column `start` on.
+    fn between(&self, mut texels: &mut [f32], start: usize, rows: [usize; 2], weight: f32) {
+        let mut column = start;
+        while !texels.is_empty() {
+            let (panel, first) = (column % SIDE / PANEL, column % PANEL);
+            let (part, rest) = texels.split_at_mut(texels.len().min(PANEL - first));
+            let lines = rows.map(|y| &self.values[(panel * SIDE + y) * PANEL + first..][..part.len()]);
+            blend(part, lines, weight, self.unit);
+            column += part.len();
+            texels = rest;
+        }
+    }
+
     /// Writes the field at a row of pixels that starts at `first`, by linear interpolation. `texels` is a buffer.
     pub(crate) fn row_into(&self, row: &mut [f32], sampler: &FieldSampler, first: Point, texels: &mut Texels) {
         let x = fixed(sampler.origin[0] + first[0] * sampler.step[0]);
         let y = fixed(sampler.origin[1] + first[1] * sampler.step[1]);
-        let line = |y: u32| &self.values[wrapped(y) * SIDE..][..SIDE];
-        let (upper, lower) = (line(y), line(y.wrapping_add(ONE)));
         let step = fixed(sampler.step[0]);
         // The range of texels of the row, from the leftmost, or all of them.
         let span = u64::from(step.cast_signed().unsigned_abs()) * row.len().saturating_sub(1) as u64;
         let count = (span / u64::from(ONE) + 2).min(SIDE as u64) as usize;
         let leftmost = if step.cast_signed() < 0 { x.wrapping_sub(span as u32) } else { x };
         let start = wrapped(leftmost);
-        let (ahead, around) = texels[..=count].split_at_mut((count + 1).min(SIDE - start));
-        between(ahead, &upper[start..], &lower[start..], fraction(y));
-        between(around, upper, lower, fraction(y));
+        let rows = [wrapped(y), wrapped(y.wrapping_add(ONE))];
+        self.between(&mut texels[..=count], start, rows, fraction(y));
         if step.cast_signed().unsigned_abs() == ONE && row.len() < SIDE {
             sample_unit_steps(row, &texels[..count], fraction(x), step != ONE);
         } else {
@@ -183,11 +212,22 @@ fn fraction(position: u32) -> f32 {
     (position % ONE) as f32 * (1.0 / ONE as f32)
 }
 
-/// Interpolates between two rows of texels.
+/// Rounds `scale` times the values to integers.
 #[multiversion::multiversion(targets = "simd")]
-fn between(texels: &mut [f32], upper: &[f32], lower: &[f32], weight: f32) {
+fn round(out: &mut [i16], values: &[f32], scale: f32) {
+    /// 1.5·2²³: adding it rounds to an integer, which the lowest bits then hold.
+    const ROUND: f32 = 12_582_912.0;
+    for (out, value) in out.iter_mut().zip(values) {
+        *out = (value * scale + ROUND).to_bits() as i16;
+    }
+}
+
+/// Interpolates between two rows of values in units of `unit`.
+#[multiversion::multiversion(targets = "simd")]
+fn blend(texels: &mut [f32], [upper, lower]: [&[i16]; 2], weight: f32, unit: f32) {
     for ((texel, upper), lower) in texels.iter_mut().zip(upper).zip(lower) {
-        *texel = upper + weight * (lower - upper);
+        let (upper, lower) = (f32::from(*upper), f32::from(*lower));
+        *texel = unit * (upper + weight * (lower - upper));
     }
 }
 
@@ -218,7 +258,8 @@ mod tests {
     #[test]
     fn a_row_matches_bilinear_interpolation_for_any_length() {
         let mut rng = Key { seed: 2, index: 0 }.stream("test", 0, "pools");
-        let noise_field = NoiseField::new((0..SIDE * SIDE).map(|_| random::uniform(&mut rng) as f32).collect());
+        let values: Vec<f32> = (0..SIDE * SIDE).map(|_| random::uniform(&mut rng) as f32).collect();
+        let noise_field = NoiseField::new(values.clone());
         assert!((noise_field.quantile(0.25) - 0.25).abs() < 0.03);
         for (texel_px, times) in [(0.3, 1), (1.0, 4), (1.17, 1), (4.0, 1)] {
             for length in [1, 2, 60, 511, 512, 1400].repeat(times) {
@@ -230,7 +271,7 @@ mod tests {
                     let [x, y] = [0, 1].map(|axis| sampler.origin[axis] + place[axis] * sampler.step[axis]);
                     let texel = |x: f64, y: f64| {
                         let [x, y] = [x, y].map(|c| c.rem_euclid(SIDE as f64) as usize);
-                        f64::from(noise_field.values[y * SIDE + x])
+                        f64::from(values[y * SIDE + x])
                     };
                     let [u, v] = [x - x.floor(), y - y.floor()];
                     let upper = texel(x, y) * (1.0 - u) + texel(x + 1.0, y) * u;

@@ -1,9 +1,7 @@
-//! Tiles, small images at a position in a larger image, and exact coverage of polygons.
+//! Tiles, small images at a position in a larger image.
 
 use core::ops::Range;
-use std::borrow::Cow;
 
-use ab_glyph_rasterizer::{Rasterizer, point};
 use multiversion::multiversion;
 
 /// A point in pixels: x right, y down, pixel centres at integers.
@@ -146,52 +144,6 @@ impl Tile {
         }
     }
 
-    /// Raises every pixel to the fraction of its area inside a simple polygon. Parts outside the tile are ignored.
-    pub(crate) fn cover(&mut self, polygon: &[Point]) {
-        let mut rasterizer = Rasterizer::new(self.width, self.height());
-        self.draw(&mut rasterizer, polygon);
-        let values = &mut self.values;
-        let mut values = values.iter_mut();
-        rasterizer.for_each_pixel(|_, fraction| {
-            let fraction = if fraction < 1.0 { fraction } else { 1.0 };
-            if let Some(value) = values.next() {
-                *value = if fraction > *value { fraction } else { *value };
-            }
-        });
-    }
-
-    /// Adds `weight` times the coverage of simple polygons, which must have the same orientation.
-    pub(crate) fn add_covers(&mut self, polygons: impl IntoIterator<Item = Vec<Point>>, weight: f32) {
-        let mut rasterizer = Rasterizer::new(self.width, self.height());
-        for polygon in polygons {
-            self.draw(&mut rasterizer, &polygon);
-        }
-        // The rasteriser adds signed areas, so one pass sums all polygons.
-        let values = &mut self.values;
-        let mut values = values.iter_mut();
-        rasterizer.for_each_pixel(|_, fraction| {
-            if let Some(value) = values.next() {
-                *value += weight * fraction;
-            }
-        });
-    }
-
-    fn draw(&self, rasterizer: &mut Rasterizer, polygon: &[Point]) {
-        let low = self.origin.map(|at| at as f64 - 0.5);
-        let high = [low[0] + self.width as f64, low[1] + self.height() as f64];
-        let polygon = &*clipped(polygon, low, high);
-        // Pixel (0, 0) of the rasteriser has its corner, not its centre, at the origin.
-        let shift = |p: Point| {
-            let x = p[0] - self.origin[0] as f64 + 0.5;
-            let y = p[1] - self.origin[1] as f64 + 0.5;
-            point(x as f32, y as f32)
-        };
-        for (index, &from) in polygon.iter().enumerate() {
-            let to = polygon[(index + 1) % polygon.len()];
-            rasterizer.draw_line(shift(from), shift(to));
-        }
-    }
-
     /// Calls `blend` with each row segment shared with another tile: the values of this tile and of the other.
     pub(crate) fn blend(&mut self, other: &Self, blend: impl FnMut(&mut [f32], &[f32])) {
         overlay(&mut self.values, self.width, self.origin, other, blend);
@@ -244,39 +196,6 @@ fn sum_where(values: &[f32], others: &[f32], min: f32) -> f64 {
     }
     let rest: f64 = last.iter().zip(others_last).map(|(value, other)| selected(*value, *other)).sum();
     parts.iter().sum::<f64>() + rest
-}
-
-/// Clips a polygon to a rectangle (Sutherland and Hodgman, doi:10.1145/360767.360802).
-fn clipped(polygon: &[Point], low: Point, high: Point) -> Cow<'_, [Point]> {
-    let inside = |p: &Point| (0..2).all(|axis| (low[axis]..=high[axis]).contains(&p[axis]));
-    if polygon.iter().all(inside) {
-        return Cow::Borrowed(polygon);
-    }
-    let mut left = polygon.to_vec();
-    for (axis, bound, sign) in [(0, low[0], 1.0), (0, high[0], -1.0), (1, low[1], 1.0), (1, high[1], -1.0)] {
-        let whole = core::mem::take(&mut left);
-        let beyond = |p: Point| sign * (p[axis] - bound);
-        for (index, &to) in whole.iter().enumerate() {
-            let from = whole[(index + whole.len() - 1) % whole.len()];
-            let (before, after) = (beyond(from), beyond(to));
-            if (before < 0.0) != (after < 0.0) {
-                let t = before / (before - after);
-                let mut cut = [from[0] + t * (to[0] - from[0]), from[1] + t * (to[1] - from[1])];
-                cut[axis] = bound;
-                left.push(cut);
-            }
-            if after >= 0.0 {
-                left.push(to);
-            }
-        }
-    }
-    // Rounding at a corner may leave a point slightly outside.
-    for point in &mut left {
-        for axis in 0..2 {
-            point[axis] = point[axis].clamp(low[axis], high[axis]);
-        }
-    }
-    Cow::Owned(left)
 }
 
 /// Calls `blend` with each row segment that an image and a tile share: the values of the image and of the tile.
@@ -332,7 +251,7 @@ pub(super) mod tests {
             .collect()
     }
 
-    fn tile(origin: [i64; 2], width: usize, height: usize) -> Tile {
+    pub(in crate::phantom) fn tile(origin: [i64; 2], width: usize, height: usize) -> Tile {
         Tile { origin, width, values: (0..width * height).map(|i| ((i * 37) % 101) as f32 / 101.0).collect() }
     }
 
@@ -358,25 +277,6 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn coverage_equals_the_area_and_covering_twice_changes_nothing() {
-        let polygon = disc([-3.3, 17.8], 6.4);
-        let mut tile = Tile::around(&polygon, 2.0);
-        tile.cover(&polygon);
-        let sum: f64 = tile.values.iter().map(|v| f64::from(*v)).sum();
-        assert!((sum - area(&polygon)).abs() < 1e-3, "{sum} {}", area(&polygon));
-        let (mut x, mut y) = (0.0, 0.0);
-        tile.for_each(|p, v| {
-            x += p[0] * f64::from(*v);
-            y += p[1] * f64::from(*v);
-        });
-        // Partly covered pixels count at their centres: accurate to 0.01 px, while a shifted grid would err by 0.5 px.
-        assert!((x / sum + 3.3).abs() < 1e-2 && (y / sum - 17.8).abs() < 1e-2, "pixel centres are at integers");
-        let once = tile.clone();
-        tile.cover(&polygon);
-        assert_eq!(once, tile);
-    }
-
-    #[test]
     fn sum_and_coarsened_preserve_the_total() {
         for (origin, width, height) in [([0, 0], 7, 30), ([-21, 3], 60, 5), ([2, -9], 3, 41), ([1, 1], 1, 1)] {
             let tile = tile(origin, width, height);
@@ -393,23 +293,6 @@ pub(super) mod tests {
                 });
                 assert!((coarse.sum() * (n * n) as f64 - sum).abs() < 1e-4, "{n}");
             }
-        }
-    }
-
-    #[test]
-    fn parts_outside_a_tile_are_ignored() {
-        let polygon = disc([4.0, 6.0], 9.0);
-        let mut whole = Tile::around(&polygon, 2.0);
-        whole.cover(&polygon);
-        for (origin, width, height) in
-            [([0, 0], 7, 30), ([-20, 3], 60, 4), ([2, -9], 3, 40), ([10, 12], 9, 9), ([30, 0], 4, 4)]
-        {
-            let mut part = tile(origin, width, height).blank();
-            part.cover(&polygon);
-            part.for_each(|p, value| {
-                let expected = at(&whole, p.map(|c| c as i64));
-                assert!((*value - expected).abs() < 1e-4, "{origin:?} {p:?}: {value} {expected}");
-            });
         }
     }
 

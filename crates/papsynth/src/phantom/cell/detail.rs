@@ -5,8 +5,9 @@ use voronoi_cytoskeleton::{LineParams, draw_into};
 
 use crate::error::ErrorKind;
 use crate::key::Stream;
+use crate::phantom::box_sums::{add_row, for_each_row_of_sums};
 use crate::phantom::cell_context::CellContext;
-use crate::phantom::noise_fields::{FieldSampler, SIDE, Texels};
+use crate::phantom::noise_fields::{FieldSampler, NoiseField, SIDE, Texels};
 use crate::phantom::parametric_shape::perturbed_circle;
 use crate::phantom::tile::{Point, Tile, scaled_about};
 use crate::random;
@@ -26,46 +27,42 @@ pub(super) fn add_detail(absorbance: &mut Tile, coverage: &Tile, cell: &CellCont
     let (cloud, fleck, grainy) = (detail.clouds as f32, detail.flecks as f32, detail.grain as f32);
     let threshold = if fleck > 0.0 { noise_fields.flecks().quantile(detail.flecks_threshold) } else { 0.0 };
     let width = absorbance.width;
-    let mut buffers = vec![0.0_f32; 2 * width];
+    let slow = cloud > 0.0 && detail.clouds_um / pixel_um >= SMOOTH_PX;
+    let mut slow_clouds = slow.then(|| CoarseTile::noise(absorbance, noise_fields.clouds(), &clouds));
+    let mut fields = [(); 3].map(|()| vec![0.0_f32; width]);
     let mut texels: Texels = [0.0; SIDE + 1];
     let rows = absorbance.values.chunks_exact_mut(width).zip(coverage.values.chunks_exact(width));
     for (y, (row, cover)) in rows.enumerate() {
         let Some((first, end)) = covered(cover) else { continue };
-        let (at, row) = ([first as f64, y as f64], &mut row[first..end]);
-        let (factor, field) = buffers.split_at_mut(width);
-        let (factor, field) = (&mut factor[..row.len()], &mut field[..row.len()]);
-        factor.fill(1.0);
-        if cloud > 0.0 {
-            noise_fields.clouds().row_into(field, &clouds, at, &mut texels);
-            add_above(factor, field, cloud, None);
+        let at = [first as f64, y as f64];
+        let [of_clouds, of_flecks, of_grain] = &mut fields;
+        match &mut slow_clouds {
+            Some(slow) => slow.row_into(of_clouds, y),
+            None if cloud > 0.0 => noise_fields.clouds().row_into(&mut of_clouds[first..end], &clouds, at, &mut texels),
+            None => {}
         }
         if fleck > 0.0 {
-            noise_fields.flecks().row_into(field, &flecks, at, &mut texels);
-            add_above(factor, field, fleck, Some(threshold));
+            noise_fields.flecks().row_into(&mut of_flecks[first..end], &flecks, at, &mut texels);
         }
         if grainy > 0.0 {
-            noise_fields.grain().row_into(field, &grain, at, &mut texels);
-            add_above(factor, field, grainy, None);
+            noise_fields.grain().row_into(&mut of_grain[first..end], &grain, at, &mut texels);
         }
-        multiply(row, factor);
+        let fields = [&*of_clouds, of_flecks, of_grain].map(|field| &field[first..end]);
+        modulate(&mut row[first..end], fields, [cloud, fleck, grainy], threshold);
     }
 }
 
-/// Adds `strength` times a field, or times its excess above a threshold.
-#[multiversion(targets = "simd")]
-fn add_above(factor: &mut [f32], field: &[f32], strength: f32, threshold: Option<f32>) {
-    let zero = threshold.unwrap_or(0.0);
-    let least = threshold.unwrap_or(f32::NEG_INFINITY);
-    for (factor, &value) in factor.iter_mut().zip(field) {
-        let above = if value > least { value } else { least };
-        *factor += strength * (above - zero);
-    }
-}
+/// Smallest standard deviation of the smoothing of clouds that are interpolated from coarse pixels, px: three coarse
+/// pixels. The root mean square error is then a hundredth of the standard deviation of the clouds.
+const SMOOTH_PX: f64 = 3.0 * COARSE as f64;
 
-/// Multiplies by factors; negative factors count as 0.
+/// Multiplies a row by 1 plus the clouds, the flecks above a threshold, and the grain, times their strengths. Negative
+/// factors count as 0.
 #[multiversion(targets = "simd")]
-fn multiply(row: &mut [f32], factors: &[f32]) {
-    for (value, &factor) in row.iter_mut().zip(factors) {
+fn modulate(row: &mut [f32], [clouds, flecks, grain]: [&[f32]; 3], strengths: [f32; 3], threshold: f32) {
+    for (((value, cloud), &fleck), grain) in row.iter_mut().zip(clouds).zip(flecks).zip(grain) {
+        let above = if fleck > threshold { fleck - threshold } else { 0.0 };
+        let factor = 1.0 + strengths[0] * cloud + strengths[1] * above + strengths[2] * grain;
         *value *= if factor > 0.0 { factor } else { 0.0 };
     }
 }
@@ -161,56 +158,12 @@ pub(super) fn thin_rim(absorbance: &mut Tile, coverage: &Tile, distance_px: f64)
     // At a straight rim, the mean coverage of a box is 0.5. One radius inside the rim, it is 1.
     let (width, side) = (coverage.width, 2 * radius + 1);
     let weight = 1.0 / (side as f32 * side as f32);
-    let row = |y: usize| coverage.values.get(y * width..(y + 1) * width);
-    // Sums of columns, with margins of zeros.
-    let mut sums = vec![0.0; width + 2 * radius];
-    let mut blocks = [sums.clone(), sums.clone()];
-    let mut boxes = vec![0.0; width];
-    let add = |sums: &mut [f32], y: Option<usize>, sign: f32| {
-        y.and_then(row).into_iter().for_each(|row| add_row(&mut sums[radius..], row, sign));
-    };
-    (0..radius).for_each(|y| add(&mut sums, Some(y), 1.0));
-    for (y, values) in absorbance.values.chunks_exact_mut(width).enumerate() {
-        add(&mut sums, Some(y + radius), 1.0);
-        sum_windows(&mut boxes, &sums, &mut blocks, side);
-        thin(values, &boxes, weight);
-        add(&mut sums, y.checked_sub(radius), -1.0);
-    }
-}
-
-/// Sums each window of `side` consecutive values, of which there are `side` − 1 more than sums. `blocks` are buffers.
-fn sum_windows(sums: &mut [f32], values: &[f32], blocks: &mut [Vec<f32>; 2], side: usize) {
-    let [blocks, doubled] = blocks;
-    blocks.copy_from_slice(values);
-    sums.fill(0.0);
-    // A window consists of blocks, whose lengths are powers of two.
-    let (mut start, mut length) = (0, 1);
-    loop {
-        if side & length != 0 {
-            add_row(sums, &blocks[start..], 1.0);
-            start += length;
+    let mut rows = absorbance.values.chunks_exact_mut(width);
+    for_each_row_of_sums(coverage, radius, |sums| {
+        if let Some(values) = rows.next() {
+            thin(values, sums, weight);
         }
-        if start == side {
-            break;
-        }
-        add_rows(doubled, blocks, &blocks[length..]);
-        core::mem::swap(blocks, doubled);
-        length *= 2;
-    }
-}
-
-#[multiversion(targets = "simd")]
-fn add_rows(sums: &mut [f32], row: &[f32], other: &[f32]) {
-    for ((sum, a), b) in sums.iter_mut().zip(row).zip(other) {
-        *sum = a + b;
-    }
-}
-
-#[multiversion(targets = "simd")]
-fn add_row(sums: &mut [f32], row: &[f32], factor: f32) {
-    for (sum, value) in sums.iter_mut().zip(row) {
-        *sum += factor * value;
-    }
+    });
 }
 
 /// Multiplies values by a factor that increases from 0 at the rim to 1 at one radius inside.
@@ -243,9 +196,8 @@ fn ramp(like: &Tile, polygon: &[Point], centre: Point, inner: f64, outer: f64) -
     ramp
 }
 
-/// A ramp like that of [`ramp`] with wide steps: drawn with pixels [`COARSE`] times as large, and interpolated
-/// linearly.
-struct CoarseRamp {
+/// A slowly changing image on a tile, drawn with pixels [`COARSE`] times as large and interpolated linearly.
+struct CoarseTile {
     /// One pixel of margin surrounds the area of the tile.
     coarse: Tile,
     line: Vec<f32>,
@@ -254,16 +206,33 @@ struct CoarseRamp {
 /// Width of a coarse pixel, px.
 const COARSE: usize = 4;
 
-impl CoarseRamp {
-    fn new(like: &Tile, polygon: &[Point], centre: Point, inner: f64, outer: f64) -> Self {
-        let place = |p: Point| {
-            let at = |axis: usize| (p[axis] - like.origin[axis] as f64 + 0.5) / COARSE as f64 + 0.5;
-            [at(0), at(1)]
-        };
+/// Position of the first coarse pixel, px.
+const FIRST: f64 = -0.5 - 0.5 * COARSE as f64;
+
+impl CoarseTile {
+    fn blank(like: &Tile) -> Self {
         let (width, height) = (like.width.div_ceil(COARSE) + 2, like.height().div_ceil(COARSE) + 2);
         let coarse = Tile { origin: [0, 0], width, values: vec![0.0; width * height] };
+        Self { coarse, line: vec![0.0; width] }
+    }
+
+    /// Draws a ramp with wide steps, as [`ramp`].
+    fn ramp(like: &Tile, polygon: &[Point], centre: Point, inner: f64, outer: f64) -> Self {
+        let place = |p: Point| [0, 1].map(|axis| (p[axis] - like.origin[axis] as f64 - FIRST) / COARSE as f64);
         let polygon: Vec<Point> = polygon.iter().map(|p| place(*p)).collect();
-        Self { coarse: ramp(&coarse, &polygon, place(centre), inner, outer), line: vec![0.0; width] }
+        let blank = Self::blank(like);
+        Self { coarse: ramp(&blank.coarse, &polygon, place(centre), inner, outer), ..blank }
+    }
+
+    /// Samples a noise field.
+    fn noise(like: &Tile, noise_field: &NoiseField, sampler: &FieldSampler) -> Self {
+        let mut drawn = Self::blank(like);
+        let (sampler, mut texels) = (sampler.coarser(COARSE as f64), [0.0; SIDE + 1]);
+        for (y, row) in drawn.coarse.values.chunks_exact_mut(drawn.coarse.width).enumerate() {
+            let first = [FIRST / COARSE as f64, FIRST / COARSE as f64 + y as f64];
+            noise_field.row_into(row, &sampler, first, &mut texels);
+        }
+        drawn
     }
 
     /// Writes row `y` of the tile.
@@ -311,7 +280,9 @@ pub(super) fn add_endoplasm(absorbance: &mut Tile, outline: &[Point], nucleus: P
     let (pixel_um, rng) = (cell.pixel_um(), &mut cell.stream("endoplasm"));
     let size = random::between(0.45, 0.75, rng);
     let softness = random::between(0.08, 0.3, rng);
-    let mut ramp_of_zone = CoarseRamp::new(absorbance, outline, nucleus, size - softness, size + softness);
+    // The ramp is wide, so that every second point is sufficient.
+    let coarse_outline: Vec<Point> = outline.iter().step_by(2).copied().collect();
+    let mut ramp_of_zone = CoarseTile::ramp(absorbance, &coarse_outline, nucleus, size - softness, size + softness);
     // Densest where the nucleus lifts the sheet.
     let radius = body.nucleus.radius_um / pixel_um;
     let round = perturbed_circle(radius, 0.15, 0.15, rng);
@@ -365,6 +336,8 @@ pub(super) fn add_halo(absorbance: &mut Tile, nucleus: Point, cell: &CellContext
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::key::Key;
+    use crate::phantom::noise_fields::NoiseFieldGenerator;
     use crate::phantom::tile::tests::{at, disc};
 
     #[test]
@@ -406,7 +379,7 @@ mod tests {
             let like = Tile { origin, width, values: vec![0.0; width * height] };
             let (polygon, centre) = (disc([1.0, 0.5], 14.0), [0.3, 0.2]);
             let exact = ramp(&like, &polygon, centre, 0.2, 1.4);
-            let mut coarse = CoarseRamp::new(&like, &polygon, centre, 0.2, 1.4);
+            let mut coarse = CoarseTile::ramp(&like, &polygon, centre, 0.2, 1.4);
             let mut row = vec![0.0; width];
             let mut errors: Vec<f64> = Vec::new();
             for (y, exact) in exact.values.chunks_exact(width).enumerate() {
@@ -420,13 +393,23 @@ mod tests {
     }
 
     #[test]
-    fn sums_of_windows_match_direct_sums() {
-        for side in [1, 3, 5, 7, 13, 16, 31] {
-            let values: Vec<f32> = (0..40 + side - 1).map(|i| ((i * 37) % 101) as f32).collect();
-            let mut sums = vec![7.0; 40];
-            sum_windows(&mut sums, &values, &mut [values.clone(), values.clone()], side);
-            let direct: Vec<f32> = values.windows(side).map(|window| window.iter().sum()).collect();
-            assert_eq!(sums, direct, "{side}");
+    fn coarse_clouds_are_close_to_the_clouds() {
+        let generator = NoiseFieldGenerator::new();
+        let noise_fields = generator.fields(Key { seed: 4, index: 0 });
+        let mut rng = Key { seed: 4, index: 0 }.stream("test", 0, "clouds");
+        let like = Tile { origin: [5, -9], width: 83, values: vec![0.0; 83 * 61] };
+        for sigma_px in [SMOOTH_PX, 20.0, 50.0].repeat(4) {
+            let sampler = FieldSampler::clouds(sigma_px, &mut rng);
+            let mut coarse = CoarseTile::noise(&like, noise_fields.clouds(), &sampler);
+            let [mut row, mut exact] = [(); 2].map(|()| vec![0.0_f32; like.width]);
+            let mut squares = 0.0;
+            for y in 0..like.height() {
+                coarse.row_into(&mut row, y);
+                noise_fields.clouds().row_into(&mut exact, &sampler, [0.0, y as f64], &mut [0.0; SIDE + 1]);
+                squares += row.iter().zip(&exact).map(|(a, b)| f64::from((a - b) * (a - b))).sum::<f64>();
+            }
+            let error = (squares / like.values.len() as f64).sqrt();
+            assert!(error < 0.02, "{sigma_px}: {error}");
         }
     }
 

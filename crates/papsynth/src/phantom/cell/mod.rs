@@ -162,12 +162,13 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
     detail::apply_gradient(&mut absorbance, plan.centre, body.radius_um / pixel_um, body.detail.thickness_gradient);
     detail::thin_rim(&mut absorbance, &coverage, body.detail.rim_um / pixel_um);
     let nucleus = [0, 1].map(|axis| plan.centre[axis] + body.nucleus.off_centre[axis] * body.radius_um / pixel_um);
-    let mut canvas = vec![0.0; absorbance.values.len()];
+    let mut canvas = vec![0.0; absorbance.values.len() + wrinkles::LANES];
     wrinkles::add(&mut absorbance, &coverage, &plan.outline, cell, &mut canvas);
     detail::add_endoplasm(&mut absorbance, &plan.outline, nucleus, cell);
     detail::add_halo(&mut absorbance, nucleus, cell);
     detail::add_detail(&mut absorbance, &coverage, cell, &mut rng);
-    detail::add_cytoskeleton(&mut absorbance, &plan.outline, cell, &mut canvas, &mut rng)?;
+    let lines = &mut canvas[..coverage.values.len()];
+    detail::add_cytoskeleton(&mut absorbance, &plan.outline, cell, lines, &mut rng)?;
     detail::add_granules(&mut absorbance, &coverage, body.detail.granules, pixel_um, &mut rng);
     // Eq. 12: A = κ·c·l.
     let strength = body.cytoplasm_absorbance.max(MIN_ABSORBANCE) as f32;

@@ -26,7 +26,8 @@ const SLOPE: f64 = 0.30;
 /// Width of the slope, relative to the wrinkle.
 const SLOPE_WIDTH: f64 = 4.0;
 
-/// Adds the wrinkles of a cell to its thickness. `canvas` is an image of zeros before and after, of the same size.
+/// Adds the wrinkles of a cell to its thickness. `canvas` is an image of zeros before and after, of the same size, with
+/// a margin of [`LANES`] values at the end.
 pub(super) fn add(
     thickness: &mut Tile,
     coverage: &Tile,
@@ -39,7 +40,6 @@ pub(super) fn add(
     let steps_round = || random::count(fsd_shape::perimeter(outline) / step).max(8);
     let rim = if detail.wrinkles > 0 { fsd_shape::resample_along(outline, steps_round()) } else { Vec::new() };
     let mut drawn: Vec<Vec<Point>> = Vec::new();
-    let section = CrossSection::new();
     for _ in 0..detail.wrinkles {
         let path = match random::uniform(rng) {
             u if u < ALONG_RIM => along_rim(outline, &rim, rng),
@@ -57,7 +57,7 @@ pub(super) fn add(
             fall: random::between(0.1, 2.0 * TAPER, rng),
             factors: random_factors(path.len(), rng),
         };
-        profile.draw(&path, &section, thickness, coverage, canvas);
+        profile.draw(&path, thickness, coverage, canvas);
         drawn.push(path);
     }
 }
@@ -147,58 +147,6 @@ impl Autoregression {
 /// Extent of a wrinkle to both sides of its crest, relative to its width; the second is that of the slope.
 const EXTENT: [f64; 2] = [3.0, 2.2 * SLOPE_WIDTH];
 
-/// A table of the cross-section of all wrinkles: a Gaussian crest with a slope on the positive side.
-struct CrossSection {
-    /// Value at each node, and the increase to the next.
-    nodes: Vec<[f32; 2]>,
-}
-
-impl CrossSection {
-    /// Nodes per standard deviation of the crest.
-    const DENSITY: u16 = 128;
-    /// Nodes before the extent, for rounding errors.
-    const MARGIN: u16 = 2;
-    /// Positions are fixed-point numbers in 2⁻¹⁶ nodes.
-    const ONE: u32 = 1 << 16;
-
-    fn new() -> Self {
-        let first = -EXTENT[0] - f64::from(Self::MARGIN) / f64::from(Self::DENSITY);
-        let count = random::count((EXTENT[1] - first) * f64::from(Self::DENSITY)) + usize::from(Self::MARGIN);
-        let mut values = vec![0.0; count];
-        tabulate(&mut values, first as f32, 1.0 / f32::from(Self::DENSITY));
-        Self { nodes: values.windows(2).map(|pair| [pair[0], pair[1] - pair[0]]).collect() }
-    }
-
-    /// Raises a row to `strength` times the cross-section. Value i has the distance `first + i·step` from the crest, in
-    /// standard deviations of the crest.
-    fn raise(&self, row: &mut [f32], [first, step]: [f64; 2], strength: f32) {
-        let density = f64::from(Self::DENSITY);
-        // The cast to 32 bits wraps, as intended: steps may be negative.
-        let fixed = |nodes: f64| (nodes * f64::from(Self::ONE)) as i64 as u32;
-        let mut position = fixed((first + EXTENT[0]) * density + f64::from(Self::MARGIN));
-        let step = fixed(step * density);
-        let last = self.nodes.len() - 1;
-        for value in row {
-            let [low, increase] = self.nodes[((position / Self::ONE) as usize).min(last)];
-            let part = (position % Self::ONE) as f32 * (1.0 / Self::ONE as f32);
-            let profile = strength * (low + part * increase);
-            *value = if profile > *value { profile } else { *value };
-            position = position.wrapping_add(step);
-        }
-    }
-}
-
-/// Computes the cross-section at equal steps, in standard deviations of the crest.
-#[multiversion(targets = "simd")]
-fn tabulate(values: &mut [f32], first: f32, step: f32) {
-    for (i, value) in values.iter_mut().enumerate() {
-        let off = first + step * i as f32;
-        let gauss = exp_f32(-0.5 * off * off);
-        let sloping = gauss + SLOPE as f32 * (exp_f32(off.max(0.0) * (-1.0 / SLOPE_WIDTH as f32)) - gauss);
-        *value = if off > 0.0 { sloping } else { gauss };
-    }
-}
-
 /// The size, strength and interruptions of a wrinkle.
 struct WrinkleProfile {
     /// Standard deviation of the crest, px.
@@ -216,8 +164,8 @@ struct WrinkleProfile {
 }
 
 impl WrinkleProfile {
-    /// Adds the wrinkle where the cell covers. `canvas` is zero before and after.
-    fn draw(&self, path: &[Point], section: &CrossSection, thickness: &mut Tile, coverage: &Tile, canvas: &mut [f32]) {
+    /// Adds the wrinkle where the cell covers. `canvas` is zero before and after, with a margin of [`LANES`] values.
+    fn draw(&self, path: &[Point], thickness: &mut Tile, coverage: &Tile, canvas: &mut [f32]) {
         let (width, height) = (thickness.width, thickness.height());
         let origin = thickness.origin.map(|at| at as f64);
         // Column range of the wrinkle in each row.
@@ -228,7 +176,7 @@ impl WrinkleProfile {
             let fade = (t / self.rise).min((1.0 - t) / self.fall).min(1.0);
             let strength = self.strength * fade * (2.0 - fade) * factor;
             if strength > 0.0 {
-                self.segment(ends, strength).paint(section, canvas, width, &mut touched);
+                paint(&self.segment(ends, strength), canvas, width, &mut touched);
             }
         }
         for (y, columns) in touched.into_iter().enumerate().filter(|(_, columns)| !columns.is_empty()) {
@@ -278,30 +226,80 @@ impl Segment {
         integers(low, high, height)
     }
 
-    /// Raises pixels to the profile and extends the touched column range of each row.
-    fn paint(&self, section: &CrossSection, canvas: &mut [f32], width: usize, touched: &mut [Range<usize>]) {
-        let directions = [self.along, self.off];
-        let inverse = directions.map(|direction| 1.0 / direction[0]);
-        for y in self.rows(touched.len()) {
-            // Coordinates of column 0 in both directions; each column adds direction[0].
-            let at = directions.map(|d| (y as f64 - self.from[1]) * d[1] - self.from[0] * d[0]);
-            let (mut low, mut high) = (0.0_f64, width as f64);
-            for (k, [least, most]) in self.range.into_iter().enumerate() {
-                if directions[k][0].abs() > 1e-9 {
-                    let [a, b] = [(least - at[k]) * inverse[k], (most - at[k]) * inverse[k]];
-                    (low, high) = (low.max(a.min(b)), high.min(a.max(b)));
-                } else if at[k] < least || at[k] > most {
-                    high = -1.0;
-                }
+    /// Returns the first column and the end of the last one in several rows from `top` on.
+    #[inline(always)]
+    fn columns(&self, top: usize, width: usize) -> [[i32; 2]; LANES] {
+        /// Smallest component along a row, so that bounds are finite.
+        const LEAST: f64 = 1e-9;
+        let mut bounds = [[0.0, width as f64 - 1.0]; LANES];
+        for (direction, range) in [self.along, self.off].into_iter().zip(self.range) {
+            // The position x d₀ + y d₁ − from · d is within the range.
+            let across = if direction[0].abs() > LEAST { direction[0] } else { LEAST };
+            let [a, b] = range.map(|end| end / across);
+            let (low, high) = if a < b { (a, b) } else { (b, a) };
+            for (r, [least, most]) in bounds.iter_mut().enumerate() {
+                let centre = self.from[0] - ((top + r) as f64 - self.from[1]) * (direction[1] / across);
+                *least = if centre + low > *least { centre + low } else { *least };
+                *most = if centre + high < *most { centre + high } else { *most };
             }
-            let columns = integers(low, high, width);
-            if columns.is_empty() {
+        }
+        bounds.map(|[least, most]| {
+            let (least, most) = (least.min(width as f64), most.max(-1.0));
+            let start = least as i32;
+            [start + i32::from(f64::from(start) < least), (most + 1.0) as i32]
+        })
+    }
+}
+
+/// Pixels computed together: few rows of a step are longer. Also the number of rows whose ends are computed together.
+pub(super) const LANES: usize = 16;
+
+/// Raises pixels to the profile and extends the touched column range of each row.
+#[multiversion(targets = "simd")]
+fn paint(segment: &Segment, canvas: &mut [f32], width: usize, touched: &mut [Range<usize>]) {
+    /// Rate at which the slope falls, per standard deviation of the crest.
+    const RATE: f32 = (-1.0 / SLOPE_WIDTH) as f32;
+    let Segment { from, off, per_width, strength, .. } = *segment;
+    let step = (off[0] * per_width) as f32;
+    // The slope falls by these factors from a pixel to the next ones. Loops, since closures are compiled separately.
+    let mut falls = [0.0; LANES];
+    for (i, fall) in falls.iter_mut().enumerate() {
+        *fall = exp_f32(RATE * step * i as f32);
+    }
+    let fall = exp_f32(RATE * step * LANES as f32);
+    let rows = segment.rows(touched.len());
+    for top in rows.clone().step_by(LANES) {
+        let columns = segment.columns(top, width);
+        // Position of the first pixel of each row, and the slope there.
+        let (mut offs, mut slopes) = ([0.0_f32; LANES], [0.0_f32; LANES]);
+        for (r, first) in offs.iter_mut().enumerate() {
+            let [x, y] = [f64::from(columns[r][0]) - from[0], (top + r) as f64 - from[1]];
+            *first = ((x * off[0] + y * off[1]) * per_width) as f32;
+        }
+        for (slope, first) in slopes.iter_mut().zip(offs) {
+            *slope = SLOPE as f32 * exp_f32(RATE * first);
+        }
+        for (r, y) in (top..rows.end.min(top + LANES)).enumerate() {
+            let [start, end] = columns[r].map(|column| column as usize);
+            if start >= end {
                 continue;
             }
-            touched[y] = touched[y].start.min(columns.start)..touched[y].end.max(columns.end);
-            let first = at[1] + columns.start as f64 * self.off[0];
-            let row = &mut canvas[y * width..][columns];
-            section.raise(row, [first * self.per_width, self.off[0] * self.per_width], self.strength);
+            touched[y] = touched[y].start.min(start)..touched[y].end.max(end);
+            let (mut first, mut slope) = (offs[r], slopes[r]);
+            for start in (start..end).step_by(LANES) {
+                let Some(canvas) = canvas[y * width + start..].first_chunk_mut::<LANES>() else { break };
+                let left = (end - start) as f32;
+                for i in 0..LANES {
+                    let off = first + step * i as f32;
+                    let gauss = exp_f32(-0.5 * off * off);
+                    let above = slope * falls[i] - SLOPE as f32 * gauss;
+                    let profile = strength * (gauss + if off > 0.0 { above } else { 0.0 });
+                    let profile = if (i as f32) < left { profile } else { 0.0 };
+                    canvas[i] = if profile > canvas[i] { profile } else { canvas[i] };
+                }
+                first += step * LANES as f32;
+                slope *= fall;
+            }
         }
     }
 }
@@ -334,11 +332,11 @@ mod tests {
             let along = [libm::cos(direction), libm::sin(direction)];
             let [a, length] = [[40.3, 33.8], [7.0, 7.0]];
             let segment = profile.segment([a, [a[0] + length[0] * along[0], a[1] + length[1] * along[1]]], 0.8);
-            let mut canvas = vec![0.0; width * height];
+            let mut canvas = vec![0.0; width * height + LANES];
             let mut touched = vec![width..0; height];
-            segment.paint(&CrossSection::new(), &mut canvas, width, &mut touched);
+            paint(&segment, &mut canvas, width, &mut touched);
             let mut painted = 0;
-            for (index, value) in canvas.iter().enumerate() {
+            for (index, value) in canvas[..width * height].iter().enumerate() {
                 let p = [(index % width) as f64 - a[0], (index / width) as f64 - a[1]];
                 let on = p[0] * along[0] + p[1] * along[1];
                 let off = side * (p[1] * along[0] - p[0] * along[1]);
@@ -360,12 +358,12 @@ mod tests {
             WrinkleProfile { width: 2.0, strength: 1.0, side: 1.0, rise: 0.1, fall: 0.1, factors: vec![1.0; 40] };
         let path: Vec<Point> = (0..40).map(|i| [f64::from(i) - 15.0, 0.4 * f64::from(i) - 9.0]).collect();
         let tile = Tile { origin: [-5, -3], width: 12, values: vec![1.0; 12 * 9] };
-        let (mut drawn, mut canvas) = (tile.clone(), vec![0.0; 12 * 9]);
-        profile.draw(&path, &CrossSection::new(), &mut drawn, &tile, &mut canvas);
+        let (mut drawn, mut canvas) = (tile.clone(), vec![0.0; 12 * 9 + LANES]);
+        profile.draw(&path, &mut drawn, &tile, &mut canvas);
         assert!(canvas.iter().all(|v| *v == 0.0));
         assert!(drawn.values.iter().any(|v| *v > 1.5) && drawn.values.iter().all(|v| (1.0..=2.0).contains(v)));
         let mut bare = tile.clone();
-        profile.draw(&path, &CrossSection::new(), &mut bare, &tile.blank(), &mut canvas);
+        profile.draw(&path, &mut bare, &tile.blank(), &mut canvas);
         assert_eq!(bare, tile);
     }
 }
