@@ -25,7 +25,7 @@ const LEAST_TRANSFER: f32 = 0.1;
 #[derive(Debug, Clone)]
 pub(crate) struct Filter {
     /// Weight of the in-focus correction, from 0 to 1.
-    pub(crate) correction: f64,
+    pub(crate) correction: f32,
     response: Response,
     restores: bool,
 }
@@ -57,6 +57,7 @@ pub(crate) struct Block<'a> {
 
 impl Filter {
     /// Creates the filter of a depth and stage position. `transfer` belongs to the same depth.
+    #[expect(clippy::cast_possible_truncation, reason = "spectra use single precision")]
     pub(crate) fn new(microscope: &Microscope, depth_um: f64, stage_um: f64, transfer: &Transfer) -> Self {
         let params = microscope.params();
         let defocus = microscope.defocus_um(depth_um, stage_um).abs();
@@ -73,7 +74,7 @@ impl Filter {
             }
         }
         let response = Response::new(transfer, &correction);
-        Self { correction: weight, response, restores: false }
+        Self { correction: weight as f32, response, restores: false }
     }
 
     /// Returns the filter of the in-focus transfer function, without correction.

@@ -18,6 +18,8 @@ pub(crate) struct OverlapIntegral {
     x: Vec<f32>,
     y: Vec<f32>,
     weight: Vec<f32>,
+    /// Waves from the axis to both outlines, for each node along f.
+    fringes: Vec<f32>,
 }
 
 /// Nodes along f: a minimum, and the number per fringe.
@@ -73,24 +75,34 @@ impl OverlapIntegral {
             square.max(0.0).sqrt()
         };
         let difference = |x: f64, y: f64| waves(pupil, direction, x + f, y) - waves(pupil, direction, x, y);
-        let node_count = |range: f64, (least, more): (usize, f64)| {
-            let fringes = range.abs().min(1000.0) * more;
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 4000")]
-            let extra = fringes as usize;
-            least + extra
-        };
         let width = split - end;
         let fringes = difference(split, 0.0) - difference(end, 0.0);
-        for &[t, w] in quadrature_rule(node_count(fringes, ALONG)) {
-            let x = end + width * t * t;
+        let rule = quadrature_rule(node_count(fringes, ALONG));
+        let position = |t: f64| end + width * t * t;
+        let Self { fringes: across, .. } = self;
+        across.clear();
+        if pupil.is_round() {
+            let single = pupil.single_precision();
+            for block in rule.chunks(LANES) {
+                let mut nodes = [[0.0; LANES]; 2];
+                for (i, [t, _]) in block.iter().enumerate() {
+                    (nodes[0][i], nodes[1][i]) = (position(*t) as f32, half_height(position(*t)) as f32);
+                }
+                across.extend_from_slice(&fringes_across(&single, f as f32, &nodes)[..block.len()]);
+            }
+        } else {
+            across.extend(rule.iter().map(|[t, _]| {
+                let (x, height) = (position(*t), half_height(position(*t)));
+                let axis = difference(x, 0.0);
+                ((difference(x, height) - axis).abs() + (difference(x, -height) - axis).abs()) as f32
+            }));
+        }
+        for (&[t, w], &fringes) in rule.iter().zip(&*across) {
+            let x = position(t);
             let weight = 2.0 * width.abs() * t * w;
             let height = half_height(x);
-            let axis = difference(x, 0.0);
-            let above = (difference(x, height) - axis).abs();
-            let below = if pupil.is_round() { above } else { (difference(x, -height) - axis).abs() };
-            let fringes = above + below;
             // The upper half of an even rule covers 0..1 of the half height.
-            let across = quadrature_rule(node_count(fringes, ACROSS) * 2);
+            let across = quadrature_rule(node_count(f64::from(fringes), ACROSS) * 2);
             for &[u, v] in &across[across.len() / 2..] {
                 let [x, y, weight] = [x, height * (2.0 * u - 1.0), weight * 2.0 * height * v].map(|value| value as f32);
                 if pupil.is_round() {
@@ -105,6 +117,33 @@ impl OverlapIntegral {
             }
         }
     }
+}
+
+/// Returns the number of nodes for a range of waves.
+fn node_count(range: f64, (least, more): (usize, f64)) -> usize {
+    let fringes = range.abs().min(1000.0) * more;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 4000")]
+    let extra = fringes as usize;
+    least + extra
+}
+
+/// Returns the waves by which the integrand changes from the axis to both outlines, at positions x and half heights.
+#[multiversion(targets = "simd")]
+fn fringes_across(waves: &RoundWaves, f: f32, [x, height]: &[[f32; LANES]; 2]) -> [f32; LANES] {
+    let mut squares = [[0.0; LANES]; 4];
+    for l in 0..LANES {
+        let (x, above) = (x[l], height[l] * height[l]);
+        squares[0][l] = x * x;
+        squares[1][l] = (x + f) * (x + f);
+        squares[2][l] = squares[0][l] + above;
+        squares[3][l] = squares[1][l] + above;
+    }
+    let [axis, shifted_axis, rim, shifted_rim] = [0, 1, 2, 3].map(|i| waves.at(&squares[i]));
+    let mut fringes = [0.0; LANES];
+    for l in 0..LANES {
+        fringes[l] = 2.0 * ((shifted_rim[l] - rim[l]) - (shifted_axis[l] - axis[l])).abs();
+    }
+    fringes
 }
 
 /// Largest rule. A pupil with more fringes transfers nothing.

@@ -121,7 +121,7 @@ enum Correction {
 struct PaddedSpectra {
     margin_px: usize,
     /// Weight of the variance that was added to the absorbed light.
-    added: f64,
+    added: f32,
     canvas: Arc<Canvas>,
     spectra: Spectra,
 }
@@ -353,7 +353,7 @@ impl PatchImager {
         let mut samples = Samples { absorbed, behind, phase, width, offset: focus.margin_px * n };
         if cached.is_none() && added > 0.0 {
             corrected.clone_from(absorbed);
-            add_scaled(corrected, &layer.variance, added as f32);
+            add_scaled(corrected, &layer.variance, added);
             samples.absorbed = corrected;
         }
         let index = cached.unwrap_or_else(|| {
