@@ -84,10 +84,10 @@ pub(crate) fn index(value: usize) -> u32 {
     value as u32
 }
 
-/// For each vertex of the final mesh, the solver's vertices and their weights.
-type Stencils = Vec<Vec<(u32, f64)>>;
+/// For each vertex of one mesh, vertices of another and their weights.
+pub(crate) type Stencils = Vec<Vec<(u32, f64)>>;
 
-fn mean<const D: usize>(stencils: &Stencils, values: &[[f64; D]]) -> impl Iterator<Item = [f64; D]> {
+pub(crate) fn mean<const D: usize>(stencils: &Stencils, values: &[[f64; D]]) -> impl Iterator<Item = [f64; D]> {
     stencils.iter().map(|stencil| {
         let mut sum = [0.0; D];
         for &(v, weight) in stencil {
