@@ -118,13 +118,16 @@ impl<const L: usize> Batch<L> {
     /// If `flats` is empty. Lanes beyond its length repeat the first.
     pub(crate) fn new(topology: &Topology, flats: &[&Flat]) -> Self {
         let lanes: [&Flat; L] = std::array::from_fn(|l| flats.get(l).copied().unwrap_or(flats[0]));
-        let row = |value: &dyn Fn(&Flat) -> f64| Lane(lanes.map(|s| single(value(s))));
-        let now: Vec<Node<L>> = (0..lanes[0].rest.len())
-            .map(|v| [row(&|s| s.rest[v][0]), row(&|s| s.rest[v][1]), row(&|s| s.heights[v])])
-            .collect();
-        let outlines = [0, 1].map(|which| -> Curve<L> {
-            (0..lanes[0].outline[which].len()).map(|k| [0, 1].map(|axis| row(&|s| s.outline[which][k][axis]))).collect()
-        });
+        let mut now: Vec<Node<L>> = vec![[Lane::ZERO; 3]; flats[0].rest.len()];
+        let mut outlines: [Curve<L>; 2] = flats[0].outline.each_ref().map(|curve| vec![[Lane::ZERO; 2]; curve.len()]);
+        for (l, flat) in lanes.iter().enumerate() {
+            for ((node, &[x, y]), &z) in now.iter_mut().zip(&flat.rest).zip(&flat.heights) {
+                [node[0][l], node[1][l], node[2][l]] = [x, y, z].map(single);
+            }
+            for (point, &[x, y]) in outlines.iter_mut().flatten().zip(flat.outline.iter().flatten()) {
+                [point[0][l], point[1][l]] = [x, y].map(single);
+            }
+        }
         let distance = |&[a, b]: &Pair| flat_distance(&now[a as usize], &now[b as usize]);
         Batch {
             lengths: topology.groups.iter().map(|group| group.pairs.iter().map(distance).collect()).collect(),
@@ -160,7 +163,7 @@ impl<const L: usize> Batch<L> {
     }
 
     pub(crate) fn lane(&self, l: usize) -> Vec<Vertex> {
-        self.now.iter().map(|n| n.map(|lane| f64::from(lane[l]))).collect()
+        self.now.iter().map(|n| [0, 1, 2].map(|axis| f64::from(n[axis][l]))).collect()
     }
 
     /// Runs the paper's method: Eq. 4 on every vertex and on the outline, distances restored by projection, a ground

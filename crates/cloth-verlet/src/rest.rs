@@ -139,8 +139,11 @@ fn expanded<R: Rng + ?Sized>(target: &[Point], area_ratio: f64, rng: &mut R) -> 
         let mut depth = PUSH_EVERYWHERE + PUSH_INTO_NOTCH * notch.max(0.0);
         for [at, width, most] in pushes {
             let apart = (k as f64 / count as f64 - at).abs();
-            let bell = libm::cos(0.5 * PI * (apart.min(1.0 - apart) / width).min(1.0));
-            depth += most * bell * bell;
+            let part = apart.min(1.0 - apart) / width;
+            if part < 1.0 {
+                let bell = libm::cos(0.5 * PI * part);
+                depth += most * bell * bell;
+            }
         }
         [n[0] * depth, n[1] * depth]
     };
