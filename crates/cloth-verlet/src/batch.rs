@@ -182,13 +182,15 @@ impl<const L: usize> Batch<L> {
             }
             let ring = self.ring.points.iter_mut().zip(&mut self.ring.before);
             for ((point, before), target) in ring.zip(&self.outlines[1]) {
+                // On copies, which cannot alias, so that the compiler vectorises the loop over lanes.
+                let (at, target, mut next) = (*point, *target, *before);
                 for axis in 0..2 {
                     for l in 0..L {
-                        let now = point[axis][l];
-                        point[axis][l] = verlet(now, before[axis][l], (target[axis][l] - now) * attraction, keep);
-                        before[axis][l] = now;
+                        let pull = (target[axis][l] - at[axis][l]) * attraction;
+                        next[axis][l] = verlet(at[axis][l], next[axis][l], pull, keep);
                     }
                 }
+                (*point, *before) = (next, at);
             }
             advance(&mut self.now, &mut self.before, &topology.vertices, keep, gravity);
             self.ring.push_inside(&mut self.now, &topology.windows, 0, step);
