@@ -109,8 +109,8 @@ numbers! {
         substeps: usize = 3, 1.0, 1000.0, "1 to 1000";
         /// Fraction of the steps that are made on a coarse mesh, 0 to 1. Default 2/3 (ours). The coarse mesh has half
         /// as many vertices and one substep in each step; it is then refined, and the remaining steps are made on the
-        /// full mesh. Large folds form on the coarse mesh, small ones on the full mesh. With 0 there is no coarse mesh:
-        /// the simulation takes twice as long, and the number and size of folds hardly differ.
+        /// full mesh. With 0 there is no coarse mesh: the simulation takes twice as long, the number and size of folds
+        /// hardly differ, and within 0.02 equivalent radii of the rim the sheet is 5 to 10 % thicker.
         coarse_fraction: f64 = 2.0 / 3.0, 0.0, 1.0, "0 to 1";
         /// Compliance of the edges in step²/vertex mass, 0 to 1000. Default 4e-5 (ours): almost inextensible.
         stretch_compliance: f64 = 4e-5, 0.0, 1000.0, "0 to 1000";
