@@ -138,8 +138,8 @@ impl<const L: usize> Batch<L> {
         }
     }
 
-    /// Adds the displacements of another mesh from its `start`, interpolated with `stencils`, and its velocities, scaled
-    /// by `ratio`.
+    /// Adds the displacements of another mesh from its `start`, interpolated with `stencils`, and its velocities,
+    /// scaled by `ratio`.
     pub(crate) fn displace(&mut self, from: &Self, start: &[Node<L>], stencils: &Stencils, ratio: f64) {
         let ratio = single(ratio);
         for ((now, before), stencil) in self.now.iter_mut().zip(&mut self.before).zip(stencils) {
