@@ -9,8 +9,9 @@ use crate::shell::{self, skipped};
 use crate::workspace::Workspace;
 
 /// Functions whose loops over lanes must not become gathers or scatters, which take several times as long.
-const HOT: [&str; 10] = [
+const HOT: [&str; 11] = [
     "ccd_noise::chain::expose_row::",
+    "cloth_verlet::cloth::solve::",
     "optics_psf::canvas::add_columns::",
     "optics_psf::canvas::mean_over_pixels::",
     "optics_psf::canvas::squares_of::",

@@ -1,4 +1,5 @@
-use crate::batch::{Batch, Start, Topology};
+use crate::batch::{Batch, Flat, Phase, Start, Topology};
+use crate::coarse::CoarseMesh;
 use crate::mesh::Disc;
 use crate::outline::{Inside, Outline};
 use crate::params::check_area_ratio;
@@ -18,6 +19,9 @@ pub struct Cloth {
     disc: Disc,
     topology: Topology,
     refinement: Refinement,
+    coarse: Option<CoarseMesh>,
+    /// The steps on the full mesh.
+    phase: Phase,
 }
 
 /// Outline and area of one sheet of [`Cloth::crumple_each`].
@@ -38,9 +42,11 @@ impl Cloth {
     pub fn new(params: &ClothParams) -> Result<Cloth, Error> {
         params.check()?;
         let disc = Disc::new(params.vertices)?;
-        let topology = Topology::new(&disc, rest::outline_points(&disc, params));
+        let topology = Topology::new(&disc, rest::outline_points(&disc, params), &params.solver);
         let refinement = Refinement::new(&disc, params.smoothing);
-        Ok(Cloth { params: params.clone(), disc, topology, refinement })
+        let [first, phase] = phases(params);
+        let coarse = if first.steps.is_empty() { None } else { Some(CoarseMesh::new(&disc, first, &params.solver)?) };
+        Ok(Cloth { params: params.clone(), disc, topology, refinement, coarse, phase })
     }
 
     /// Crumples one sheet into an outline: a simple polygon in either orientation, in any unit.
@@ -95,18 +101,24 @@ impl Cloth {
     }
 
     fn solved_in_lanes<const L: usize>(&self, starts: &[&Start]) -> Vec<Sheet> {
-        let batch = self.run::<L>(starts);
+        let flats: Vec<&Flat> = starts.iter().map(|start| &start.flat).collect();
+        let batch = self.run::<L>(&flats);
         starts.iter().enumerate().map(|(l, start)| self.finished(start, &batch.lane(l))).collect()
     }
 
-    fn run<const L: usize>(&self, starts: &[&Start]) -> Batch<L> {
-        let mut batch = Batch::new(&self.topology, starts);
-        solve(&mut batch, &self.topology, &self.params);
+    fn run<const L: usize>(&self, flats: &[&Flat]) -> Batch<L> {
+        let Cloth { params, topology, coarse, phase, .. } = self;
+        let mut batch = Batch::new(topology, flats);
+        if let Some(coarse) = coarse {
+            let run = |batch: &mut Batch<L>| solve(batch, &coarse.topology, &coarse.phase, params);
+            coarse.advance(&mut batch, flats, phase.substeps, run);
+        }
+        solve(&mut batch, topology, phase, params);
         batch
     }
 
     fn finished(&self, start: &Start, vertices: &[Vertex]) -> Sheet {
-        let mut sheet = self.refinement.apply(vertices, &start.rest);
+        let mut sheet = self.refinement.apply(vertices, &start.flat.rest);
         let rim_on_outline = matches!(self.params.solver, Solver::Xpbd(_));
         if rim_on_outline {
             self.refinement.snap_rim(&mut sheet, &start.shape, start.offset);
@@ -125,22 +137,35 @@ impl Cloth {
     }
 }
 
+/// Returns the steps on the coarse mesh and those on the full mesh.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of steps")]
+fn phases(params: &ClothParams) -> [Phase; 2] {
+    let all = params.steps;
+    let (coarse, substeps) = match &params.solver {
+        Solver::Verlet(_) => (0, 1),
+        Solver::Xpbd(p) => ((p.coarse_fraction * all as f64).round() as usize, p.substeps),
+    };
+    [Phase { steps: 0..coarse, all, substeps: 1 }, Phase { steps: coarse..all, all, substeps }]
+}
+
 /// Compiled for each instruction set. No operations are fused, so that all give the same bits.
 #[multiversion(targets = "simd")]
-fn solve<const L: usize>(batch: &mut Batch<L>, topology: &Topology, params: &ClothParams) {
+fn solve<const L: usize>(batch: &mut Batch<L>, topology: &Topology, phase: &Phase, params: &ClothParams) {
     match &params.solver {
-        Solver::Verlet(p) => batch.verlet(topology, params.steps, p),
-        Solver::Xpbd(p) => batch.xpbd(topology, params.steps, p),
+        Solver::Verlet(p) => batch.verlet(topology, phase.all, p),
+        Solver::Xpbd(p) => batch.xpbd(topology, phase, p),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::RestShape;
+    use crate::batch::{Group, Kind};
     use crate::outline::{distance, moments, sides};
+    use crate::refine::mean;
     use crate::sheet::cross;
     use crate::testing::{angular, rng, wavy};
+    use crate::{PixelGrid, RestShape, XpbdParams};
 
     fn coarse() -> ClothParams {
         ClothParams { vertices: 300, ..ClothParams::default() }
@@ -187,6 +212,35 @@ mod tests {
             let (strain, area_ratio) = (sheet.edge_strain_rms(), sheet.rest_area() / moments(&outline).0);
             assert!(strain < 0.03 && (area_ratio - 1.12).abs() < 0.005, "{strain} {area_ratio}");
         }
+    }
+
+    #[test]
+    fn the_coarse_mesh_hardly_changes_the_folds() {
+        const SHEETS: u64 = 64;
+        // Means over sheets of the strain, and of the spread and the dark part of the thickness.
+        let statistics = |coarse_fraction: f64| -> [f64; 3] {
+            let solver = Solver::Xpbd(XpbdParams { coarse_fraction, ..XpbdParams::default() });
+            let cloth = Cloth::new(&ClothParams { solver, ..ClothParams::default() }).unwrap();
+            let outlines: Vec<Vec<Point>> = (0..SHEETS).map(|k| wavy(2.0 + (k % 4) as f64, 0.1)).collect();
+            let borrowed: Vec<&[Point]> = outlines.iter().map(Vec::as_slice).collect();
+            let mut sums = [0.0; 3];
+            for sheet in cloth.crumple_many(&borrowed, &mut (0..SHEETS).map(rng).collect::<Vec<_>>()) {
+                let sheet = sheet.unwrap();
+                let mut image = vec![0.0_f32; 230 * 230];
+                let grid = PixelGrid { origin: [-85.0, -135.0], pixel_size: 1.0 };
+                sheet.thickness_into(&mut image, 230, &grid, |_| 1.0);
+                let inner: Vec<f64> = image.iter().filter(|t| **t > 0.9).map(|&t| f64::from(t)).collect();
+                let mean = inner.iter().sum::<f64>() / inner.len() as f64;
+                let variance = inner.iter().map(|t| (t - mean) * (t - mean)).sum::<f64>() / inner.len() as f64;
+                let dark = inner.iter().filter(|t| **t > 1.5).count() as f64 / inner.len() as f64;
+                for (sum, value) in sums.iter_mut().zip([sheet.edge_strain_rms(), variance.sqrt(), dark]) {
+                    *sum += value / SHEETS as f64;
+                }
+            }
+            sums
+        };
+        let (with, without) = (statistics(2.0 / 3.0), statistics(0.0));
+        assert!(with.iter().zip(without).all(|(a, b)| (a / b - 1.0).abs() < 0.1), "{with:?} {without:?}");
     }
 
     #[test]
@@ -256,10 +310,40 @@ mod tests {
     }
 
     /// Reference implementation of both solvers: one sheet in f64, every vertex against every side.
-    fn reference(cloth: &Cloth, start: &Start) -> Vec<Vertex> {
-        let Cloth { params, topology, .. } = cloth;
-        let mut now: Vec<Vertex> = start.rest.iter().zip(&start.heights).map(|(r, &h)| [r[0], r[1], h]).collect();
-        let (mut before, [mut ring, target]) = (now.clone(), start.outline.clone());
+    fn reference(cloth: &Cloth, flat: &Flat) -> Vec<Vertex> {
+        let at = |flat: &Flat| -> Vec<Vertex> {
+            flat.rest.iter().zip(&flat.heights).map(|(r, &h)| [r[0], r[1], h]).collect()
+        };
+        let (start, substeps) = (at(flat), cloth.phase.substeps);
+        let Some(coarse) = &cloth.coarse else {
+            return reference_steps(&cloth.params, &cloth.topology, &cloth.phase, flat, [start.clone(), start])[0]
+                .clone();
+        };
+        let small = coarse.flat(flat);
+        let begin = at(&small);
+        let moved =
+            reference_steps(&cloth.params, &coarse.topology, &coarse.phase, &small, [begin.clone(), begin.clone()]);
+        // Displacement since the start and in the last substep, for each coarse vertex.
+        let change = |from: &[Vertex]| -> Vec<Vertex> {
+            moved[0].iter().zip(from).map(|(p, q)| std::array::from_fn(|i| p[i] - q[i])).collect()
+        };
+        let fine = |values: &[Vertex]| -> Vec<Vertex> { mean(&coarse.to_fine, values).collect() };
+        let (way, last) = (fine(&change(&begin)), fine(&change(&moved[1])));
+        let now: Vec<Vertex> = start.iter().zip(&way).map(|(p, w)| std::array::from_fn(|i| p[i] + w[i])).collect();
+        let slow = |(p, v): (&Vertex, &Vertex)| -> Vertex { std::array::from_fn(|i| p[i] - v[i] / substeps as f64) };
+        let before = now.iter().zip(&last).map(slow).collect();
+        reference_steps(&cloth.params, &cloth.topology, &cloth.phase, flat, [now, before])[0].clone()
+    }
+
+    /// Runs the steps of `phase` from the last two positions. Returns the new last two.
+    fn reference_steps(
+        params: &ClothParams,
+        topology: &Topology,
+        phase: &Phase,
+        flat: &Flat,
+        [mut now, mut before]: [Vec<Vertex>; 2],
+    ) -> [Vec<Vertex>; 2] {
+        let [mut ring, target] = flat.outline.clone();
         let mut ring_before = ring.clone();
         let project =
             |now: &mut [Vertex], pairs: &[[u32; 2]], weights: [f64; 2], compliance: f64, yield_strain: f64| {
@@ -268,7 +352,7 @@ mod tests {
                     let (a, b) = (a as usize, b as usize);
                     let d: Vertex = std::array::from_fn(|i| now[b][i] - now[a][i]);
                     let length = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
-                    let part = gain * (1.0 - distance(start.rest[a], start.rest[b]) / length).max(-yield_strain);
+                    let part = gain * (1.0 - distance(flat.rest[a], flat.rest[b]) / length).max(-yield_strain);
                     for axis in 0..3 {
                         now[a][axis] += weights[0] * part * d[axis];
                         now[b][axis] -= weights[1] * part * d[axis];
@@ -291,8 +375,8 @@ mod tests {
         match &params.solver {
             Solver::Verlet(p) => {
                 for _ in 0..params.steps {
-                    for pairs in std::iter::repeat_n(&topology.edges, p.passes).flatten() {
-                        project(&mut now, pairs, [1.0; 2], 0.0, f64::INFINITY);
+                    for group in std::iter::repeat_n(&topology.groups, p.passes).flatten() {
+                        project(&mut now, &group.pairs, [1.0; 2], 0.0, f64::INFINITY);
                     }
                     for ((r, b), target) in ring.iter_mut().zip(&mut ring_before).zip(&target) {
                         let next: Point = std::array::from_fn(|i| {
@@ -305,28 +389,29 @@ mod tests {
                 }
             }
             Solver::Xpbd(p) => {
-                let (rim, small) = (topology.rim, p.substeps as f64);
-                for substep in 1..=params.steps * p.substeps {
-                    let s = substep as f64 / (params.steps as f64 * small);
-                    for (k, (a, b)) in start.outline[0].iter().zip(&target).enumerate() {
+                let (rim, small) = (topology.rim, phase.substeps as f64);
+                for substep in phase.steps.start * phase.substeps + 1..=phase.steps.end * phase.substeps {
+                    let s = substep as f64 / (phase.all as f64 * small);
+                    for (k, (a, b)) in flat.outline[0].iter().zip(&target).enumerate() {
                         ring[k] = [0, 1].map(|i| a[i] + (b[i] - a[i]) * s * s * (3.0 - 2.0 * s));
                         now[k] = [ring[k][0], ring[k][1], now[k][2]];
                     }
                     let keep = libm::pow(1.0 - p.damping, 1.0 / small);
                     advance(&mut now[rim..], &mut before[rim..], keep, p.gravity / small / small);
-                    let stretch = (&topology.edges, p.stretch_compliance, f64::INFINITY);
-                    for (pairs, compliance, yield_strain) in
-                        [stretch, (&topology.bends, p.bend_compliance, p.bend_yield)]
-                    {
-                        project(&mut now, &pairs[1], [0.0, 1.0], compliance * small * small, yield_strain);
-                        project(&mut now, &pairs[2], [1.0, 1.0], compliance * small * small, yield_strain);
+                    for Group { kind, fixed, pairs } in &topology.groups {
+                        let (compliance, yield_strain) = match kind {
+                            Kind::Stretch => (p.stretch_compliance, f64::INFINITY),
+                            Kind::Bend => (p.bend_compliance, p.bend_yield),
+                        };
+                        let weights = if *fixed { [0.0, 1.0] } else { [1.0, 1.0] };
+                        project(&mut now, pairs, weights, compliance * small * small, yield_strain);
                     }
-                    let pressed = substep.is_multiple_of(p.substeps);
+                    let pressed = substep.is_multiple_of(phase.substeps);
                     confine(&mut now[rim..], pressed.then_some(&ring), p.ceiling);
                 }
             }
         }
-        now
+        [now, before]
     }
 
     #[test]
@@ -338,9 +423,9 @@ mod tests {
                 cloth.start(SheetSpec { outline: &outline, area_ratio }, &mut rng(u64::from(k))).unwrap()
             };
             let starts: Vec<Start> = (0..4).map(start).collect();
-            let batch = cloth.run::<LANES>(&starts.iter().collect::<Vec<_>>());
+            let batch = cloth.run::<LANES>(&starts.iter().map(|start| &start.flat).collect::<Vec<_>>());
             for (l, start) in starts.iter().enumerate() {
-                let (found, reference) = (batch.lane(l), reference(&cloth, start));
+                let (found, reference) = (batch.lane(l), reference(&cloth, &start.flat));
                 let errors = found.as_flattened().iter().zip(reference.as_flattened()).map(|(p, q)| (p - q) * (p - q));
                 let rms = (errors.sum::<f64>() / reference.len() as f64).sqrt();
                 assert!(rms < 1e-3, "lane {l}: {rms}");

@@ -100,6 +100,9 @@ impl Sheet {
         let beyond = |v: &[f64; 3]| (v[0] - crease.point[0]) * normal[0] + (v[1] - crease.point[1]) * normal[1];
         let mut far: Vec<f64> = self.vertices.iter().map(beyond).collect();
         let end = far.iter().fold(0.0_f64, |m, &s| m.max(s));
+        if end == 0.0 {
+            return Ok(());
+        }
         self.cut(&mut far, &crease.strips(end).collect::<Vec<_>>(), ON_LINE * crease.radius);
         for (v, &s) in self.vertices.iter_mut().zip(&far) {
             if s > 0.0 {

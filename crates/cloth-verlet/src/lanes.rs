@@ -101,17 +101,15 @@ pub(crate) fn advance<const L: usize>(
 /// Parameters of a set of distance constraints.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Constraint {
-    /// Inverse masses of both ends of a pair.
-    pub(crate) weights: [f32; 2],
-    /// 1 / (∑w + α̃).
+    /// 1 / (∑w + α̃), with the weight w = 1 of a free vertex.
     pub(crate) gain: f32,
     /// Relative compression beyond which the resistance is constant.
     pub(crate) yield_strain: f32,
 }
 
-/// Projects the distances of all pairs once.
+/// Projects the distances of all pairs once. The first vertex of a pair is either `FREE` or fixed, the second is free.
 #[inline(always)]
-pub(crate) fn project<const L: usize>(
+pub(crate) fn project<const FREE: bool, const L: usize>(
     now: &mut [Node<L>],
     pairs: &[Pair],
     lengths: &[Lane<L>],
@@ -119,25 +117,46 @@ pub(crate) fn project<const L: usize>(
 ) {
     for (&[a, b], rest) in pairs.iter().zip(lengths) {
         if let Ok([p, q]) = now.get_disjoint_mut([a as usize, b as usize]) {
-            project_pair(p, q, rest, &constraint);
+            project_pair::<FREE, L>(p, q, rest, &constraint);
         }
     }
 }
 
 /// Projects one distance in all lanes. Works on copies, which cannot alias, so that the compiler vectorises.
 #[inline(always)]
-fn project_pair<const L: usize>(p: &mut Node<L>, q: &mut Node<L>, rest: &Lane<L>, constraint: &Constraint) {
+fn project_pair<const FREE: bool, const L: usize>(
+    p: &mut Node<L>,
+    q: &mut Node<L>,
+    rest: &Lane<L>,
+    constraint: &Constraint,
+) {
     let least = -(constraint.gain * constraint.yield_strain);
     let (mut a, mut b) = (*p, *q);
     for l in 0..L {
         let d = [b[0][l] - a[0][l], b[1][l] - a[1][l], b[2][l] - a[2][l]];
         let s = at_least(correction(d, rest[l], constraint.gain), least);
         for axis in 0..3 {
-            a[axis][l] += d[axis] * (s * constraint.weights[0]);
-            b[axis][l] -= d[axis] * (s * constraint.weights[1]);
+            let moved = d[axis] * s;
+            if FREE {
+                a[axis][l] += moved;
+            }
+            b[axis][l] -= moved;
         }
     }
-    (*p, *q) = (a, b);
+    if FREE {
+        *p = a;
+    }
+    *q = b;
+}
+
+/// Returns the distance of two vertices in the plane.
+pub(crate) fn flat_distance<const L: usize>(a: &Node<L>, b: &Node<L>) -> Lane<L> {
+    let mut distance = Lane::ZERO;
+    for l in 0..L {
+        let (x, y) = (b[0][l] - a[0][l], b[1][l] - a[1][l]);
+        distance[l] = (x * x + y * y).sqrt();
+    }
+    distance
 }
 
 /// Clamps the heights of the vertices `which` between ground and ceiling.
@@ -237,8 +256,8 @@ mod tests {
         let before = sum(&now);
         let pairs: Vec<Pair> = (0..29).map(|k| [k, k + 1]).collect();
         for _ in 0..20 {
-            let constraint = Constraint { weights: [1.0; 2], gain: 0.4, yield_strain: 0.2 };
-            project(&mut now, &pairs, &[Lane([0.3]); 29], constraint);
+            let constraint = Constraint { gain: 0.4, yield_strain: 0.2 };
+            project::<true, 1>(&mut now, &pairs, &[Lane([0.3]); 29], constraint);
         }
         assert!(before.iter().zip(sum(&now)).all(|(a, b)| (a - b).abs() < 1e-4));
     }

@@ -3,6 +3,7 @@
 
 mod batch;
 mod cloth;
+mod coarse;
 mod crease;
 mod error;
 #[cfg(any(feature = "mint", feature = "nalgebra"))]

@@ -1,9 +1,10 @@
 //! The triangulated disc of all sheets. All sheets have the same topology, so that they can be solved in vector lanes.
 
+use crate::refine::{Stencils, index};
 use crate::sheet::{cross, edges};
 use crate::{Error, Point};
 use multiversion::multiversion;
-use spade::{DelaunayTriangulation, Triangulation};
+use spade::{DelaunayTriangulation, FloatTriangulation, Point2, Triangulation};
 use std::f64::consts::{PI, TAU};
 
 /// The paper's mesh: 75 vertices on the rim of 538.
@@ -26,10 +27,10 @@ pub(crate) struct Disc {
     pub(crate) rim: usize,
     /// Counter-clockwise.
     pub(crate) triangles: Vec<[u32; 3]>,
-    /// Smaller index first, in the order of the solver.
-    pub(crate) edges: Vec<Pair>,
-    /// The two vertices opposite each inner edge, in the order of the solver.
-    pub(crate) bends: Vec<Pair>,
+    /// Smaller index first, patch by patch in the order of the solver.
+    pub(crate) edges: Vec<Vec<Pair>>,
+    /// The two vertices opposite each inner edge, in the same patches.
+    pub(crate) bends: Vec<Vec<Pair>>,
     /// `harmonics[k][v]` is the weight of rim vertex k in inner vertex v.
     harmonics: Vec<Vec<f64>>,
 }
@@ -57,6 +58,23 @@ impl Disc {
         }
         curve.iter().copied().chain(xs.into_iter().zip(ys).map(|(x, y)| [x, y])).collect()
     }
+
+    /// Returns the weights of linear interpolation from the vertices of this mesh to those of another: along the rim
+    /// for vertices on the rim, within a triangle for the others.
+    pub(crate) fn interpolation(&self, to: &Disc) -> Result<Stencils, Error> {
+        let mesh = triangulation(&self.points)?;
+        let triangles = mesh.barycentric();
+        let on_rim = |k: usize| {
+            let (whole, part) = (k * self.rim / to.rim, (k * self.rim % to.rim) as f64 / to.rim as f64);
+            vec![(index(whole), 1.0 - part), (index((whole + 1) % self.rim), part)]
+        };
+        let mut weights = Vec::new();
+        let inside = to.points[to.rim..].iter().map(|p| {
+            triangles.get_weights(Point2::new(p[0], p[1]), &mut weights);
+            weights.iter().map(|(v, weight)| (index(v.index()), *weight)).collect()
+        });
+        Ok((0..to.rim).map(on_rim).chain(inside).collect())
+    }
 }
 
 #[multiversion(targets = "simd")]
@@ -82,14 +100,19 @@ fn sunflower(rim: usize, inner: usize) -> Vec<Point> {
 }
 
 fn delaunay(points: &[Point]) -> Result<Vec<[u32; 3]>, Error> {
-    let vertices = points.iter().map(|p| spade::Point2::new(p[0], p[1])).collect();
-    let mesh = DelaunayTriangulation::<_>::bulk_load_stable(vertices).map_err(|_| Error::Parameter {
+    let corners = |mesh: DelaunayTriangulation<_>| {
+        mesh.inner_faces().map(|face| face.vertices().map(|v| index(v.fix().index()))).collect()
+    };
+    triangulation(points).map(corners)
+}
+
+fn triangulation(points: &[Point]) -> Result<DelaunayTriangulation<Point2<f64>>, Error> {
+    let vertices = points.iter().map(|p| Point2::new(p[0], p[1])).collect();
+    DelaunayTriangulation::bulk_load_stable(vertices).map_err(|_| Error::Parameter {
         field: "vertices",
         value: f64::NAN,
         accepted: "a number of points that can be triangulated",
-    })?;
-    #[expect(clippy::cast_possible_truncation, reason = "counts far below 2^32")]
-    Ok(mesh.inner_faces().map(|face| face.vertices().map(|v| v.fix().index() as u32)).collect())
+    })
 }
 
 /// Moves each inner vertex to the centre of mass of the triangles around it.
@@ -124,8 +147,8 @@ fn pairs(triangles: &[[u32; 3]], vertices: usize) -> (Vec<Pair>, Vec<Pair>) {
 /// Orders pairs for the solver: patch by patch, so that a patch stays in the L1 cache. The order of patches is
 /// scattered over the disc, so that no direction is preferred. Within a patch, consecutive pairs share no vertex, so
 /// that they do not wait for each other.
-fn ordered(pairs: &[Pair], points: &[Point]) -> Vec<Pair> {
-    patches(pairs, points).iter().flat_map(|patch| independent_sets(patch, points.len())).collect()
+fn ordered(pairs: &[Pair], points: &[Point]) -> Vec<Vec<Pair>> {
+    patches(pairs, points).iter().map(|patch| independent_sets(patch, points.len())).collect()
 }
 
 /// Groups pairs by the grid square that contains their midpoint.
@@ -188,6 +211,7 @@ fn harmonics(points: &[Point], rim: usize) -> Vec<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::refine::mean;
     use std::collections::BTreeSet;
 
     #[test]
@@ -195,8 +219,9 @@ mod tests {
         let disc = Disc::new(538).unwrap();
         assert_eq!((disc.points.len(), disc.rim), (538, 75));
         // Euler: V − E + F = 1, and the rim is the boundary.
-        assert_eq!(538 + disc.triangles.len(), disc.edges.len() + 1);
-        assert_eq!(disc.edges.len() - disc.bends.len(), 75);
+        let [edges, bends] = [disc.edges.concat(), disc.bends.concat()];
+        assert_eq!(538 + disc.triangles.len(), edges.len() + 1);
+        assert_eq!(edges.len() - bends.len(), 75);
         let area: f64 = disc
             .triangles
             .iter()
@@ -204,8 +229,7 @@ mod tests {
             .map(|[a, b, c]| cross(a, b, c) / 2.0)
             .sum();
         assert!((area - 37.5 * libm::sin(TAU / 75.0)).abs() < 1e-9);
-        let lengths: Vec<f64> = disc
-            .edges
+        let lengths: Vec<f64> = edges
             .iter()
             .map(|&[a, b]| crate::outline::distance(disc.points[a as usize], disc.points[b as usize]))
             .collect();
@@ -216,10 +240,10 @@ mod tests {
     #[test]
     fn sets_of_pairs_share_no_vertex() {
         let disc = Disc::new(200).unwrap();
-        for pairs in [&disc.edges, &disc.bends] {
+        for pairs in [disc.edges.concat(), disc.bends.concat()] {
             let mut taken = BTreeSet::new();
             let mut sets = 1;
-            for [a, b] in independent_sets(pairs, 200) {
+            for [a, b] in independent_sets(&pairs, 200) {
                 assert!(a < b);
                 if !taken.insert(a) | !taken.insert(b) {
                     sets += 1;
@@ -236,12 +260,31 @@ mod tests {
         let (mut edges, bends) = pairs(&disc.triangles, 2000);
         for (found, all) in [(&disc.edges, &edges), (&disc.bends, &bends)] {
             let sorted = |pairs: &[Pair]| BTreeSet::from_iter(pairs.to_vec());
-            assert_eq!((found.len(), sorted(found)), (all.len(), sorted(all)));
+            let found = found.concat();
+            assert_eq!((found.len(), sorted(&found)), (all.len(), sorted(all)));
         }
         edges.reverse();
         for patch in patches(&edges, &disc.points) {
             let vertices: BTreeSet<u32> = patch.iter().flatten().copied().collect();
             assert!(vertices.len() < 200, "{}", vertices.len());
+        }
+    }
+
+    #[test]
+    fn interpolation_reproduces_linear_functions() {
+        for (from, to) in [(16, 32), (32, 16), (300, 600), (600, 300), (65, 100)] {
+            let [from, to] = [from, to].map(|vertices| Disc::new(vertices).unwrap());
+            let stencils = from.interpolation(&to).unwrap();
+            let found: Vec<Point> = mean(&stencils, &from.points).collect();
+            for (v, (found, wanted)) in found.iter().zip(&to.points).enumerate() {
+                // A vertex on the circle is interpolated on a chord.
+                let most = if v < to.rim { 1.0 - libm::cos(PI / from.rim as f64) } else { 0.0 };
+                assert!(crate::outline::distance(*found, *wanted) < most + 1e-9, "{v}: {found:?} {wanted:?}");
+            }
+            for stencil in &stencils {
+                let sum: f64 = stencil.iter().map(|(_, weight)| weight).sum();
+                assert!((sum - 1.0).abs() < 1e-12 && stencil.iter().all(|(_, weight)| *weight >= -1e-12));
+            }
         }
     }
 

@@ -111,9 +111,13 @@ pub(crate) struct Inside {
     sides: Vec<(Point, Point)>,
     low: f64,
     bands_per_unit: f64,
-    bands: Vec<Vec<u32>>,
+    /// The numbers of the sides in each band, one band after the other, and where each begins.
+    in_bands: Vec<u32>,
+    band_starts: Vec<u32>,
     /// Bounding box of each [`GROUP`] of sides.
     boxes: Vec<[Point; 2]>,
+    /// Square of the radius of a circle around the origin inside the polygon, or 0.
+    inner_square: f64,
 }
 
 impl Inside {
@@ -125,23 +129,45 @@ impl Inside {
         let high = boxes.iter().fold(f64::NEG_INFINITY, |m, b| m.max(b[1][1]));
         let count = points.len();
         let bands_per_unit = count as f64 / (high - low);
-        let mut bands = vec![Vec::new(); count + 1];
-        for (side, (a, b)) in sides.iter().enumerate() {
+        let bands = |(a, b): &(Point, Point)| {
             let band = |y: f64| (((y - low) * bands_per_unit) as usize).min(count);
-            for band in &mut bands[band(a[1].min(b[1]))..=band(a[1].max(b[1]))] {
-                band.push(side as u32);
+            band(a[1].min(b[1]))..=band(a[1].max(b[1]))
+        };
+        // Ends of the bands, which become their starts as sides are filled in from the last.
+        let mut band_starts = vec![0_u32; count + 2];
+        for band in sides.iter().flat_map(bands) {
+            band_starts[band] += 1;
+        }
+        let mut end = 0;
+        for start in &mut band_starts {
+            end += *start;
+            *start = end;
+        }
+        let mut in_bands = vec![0; end as usize];
+        for (side, ends) in sides.iter().enumerate().rev() {
+            for band in bands(ends) {
+                band_starts[band] -= 1;
+                in_bands[band_starts[band] as usize] = side as u32;
             }
         }
-        Inside { sides, low, bands_per_unit, bands, boxes }
+        let mut inside = Inside { sides, low, bands_per_unit, in_bands, band_starts, boxes, inner_square: 0.0 };
+        if inside.contains([0.0, 0.0]) {
+            inside.inner_square = square([0.0, 0.0], inside.foot([0.0, 0.0]));
+        }
+        inside
     }
 
     /// Returns whether a point is inside, by the even-odd rule.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a band number, checked by get")]
     pub(crate) fn contains(&self, p: Point) -> bool {
         let band = (p[1] - self.low) * self.bands_per_unit;
-        let Some(list) = self.bands.get(band as usize).filter(|_| band >= 0.0) else {
+        let Some(&[start, end]) = self.band_starts.get(band as usize..).and_then(|b| b.first_chunk()) else {
             return false;
         };
+        if band < 0.0 {
+            return false;
+        }
+        let list = &self.in_bands[start as usize..end as usize];
         let crossed = |&&side: &&u32| {
             let (a, b) = self.sides[side as usize];
             (a[1] > p[1]) != (b[1] > p[1]) && p[0] < a[0] + (p[1] - a[1]) * (b[0] - a[0]) / (b[1] - a[1])
@@ -151,9 +177,11 @@ impl Inside {
 
     /// Returns `p` if it is inside, otherwise the nearest point of the boundary.
     pub(crate) fn nearest(&self, p: Point) -> Point {
-        if self.contains(p) {
-            return p;
-        }
+        if p[0] * p[0] + p[1] * p[1] < self.inner_square || self.contains(p) { p } else { self.foot(p) }
+    }
+
+    /// Returns the nearest point of the boundary.
+    fn foot(&self, p: Point) -> Point {
         let mut best = (f64::INFINITY, p);
         for (group, [low, high]) in self.sides.chunks(GROUP).zip(&self.boxes) {
             let corner = [p[0].clamp(low[0], high[0]), p[1].clamp(low[1], high[1])];

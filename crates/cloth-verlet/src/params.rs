@@ -107,6 +107,11 @@ numbers! {
     XpbdParams {
         /// Substeps in each step, 1 to 1000. Default 3 (ours).
         substeps: usize = 3, 1.0, 1000.0, "1 to 1000";
+        /// Fraction of the steps that are made on a coarse mesh, 0 to 1. Default 2/3 (ours). The coarse mesh has half
+        /// as many vertices and one substep in each step; it is then refined, and the remaining steps are made on the
+        /// full mesh. With 0 there is no coarse mesh: the simulation takes twice as long, the number and size of folds
+        /// hardly differ, and within 0.02 equivalent radii of the rim the sheet is 5 to 10 % thicker.
+        coarse_fraction: f64 = 2.0 / 3.0, 0.0, 1.0, "0 to 1";
         /// Compliance of the edges in step²/vertex mass, 0 to 1000. Default 4e-5 (ours): almost inextensible.
         stretch_compliance: f64 = 4e-5, 0.0, 1000.0, "0 to 1000";
         /// Compliance of the distances across edges, which resist bending, in step²/vertex mass, 0 to 1000. Default
@@ -214,6 +219,7 @@ mod tests {
             ("lift", verlet(VerletParams { lift: bad, ..v() })),
             ("gravity", verlet(VerletParams { gravity: f64::INFINITY, ..v() })),
             ("substeps", xpbd(XpbdParams { substeps: 0, ..x() })),
+            ("coarse_fraction", xpbd(XpbdParams { coarse_fraction: 1.1, ..x() })),
             ("damping", xpbd(XpbdParams { damping: -0.1, ..x() })),
             ("ceiling", xpbd(XpbdParams { ceiling: 10.1, ..x() })),
         ] {

@@ -2,7 +2,7 @@
 
 use crate::mesh::Disc;
 use crate::outline::Outline;
-use crate::sheet::{edges, rim};
+use crate::sheet::{Edge, OUTSIDE, edges, rim};
 use crate::{Point, Sheet, Smoothing, Vertex};
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -16,28 +16,43 @@ const MERGE_DISTANCE: f64 = 1e-9;
 pub(crate) struct Refinement {
     /// The flat disc.
     flat: Sheet,
-    stencils: Stencils,
-    /// The vertices of the rim in order, and the triangle at each of its sides.
-    rim: Vec<(u32, u32)>,
+    /// `None` if the vertices are those of the solver.
+    stencils: Option<Stencils>,
+    /// The sides of the rim in order.
+    rim: Vec<RimSide>,
+}
+
+/// A side of the rim.
+#[derive(Debug)]
+struct RimSide {
+    /// The vertex where it starts.
+    start: u32,
+    triangle: u32,
+    /// Index of the edge.
+    edge: usize,
+    /// Index of the edge from `start` to the third corner of the triangle.
+    spoke: usize,
 }
 
 impl Refinement {
     pub(crate) fn new(disc: &Disc, smoothing: Smoothing) -> Refinement {
         let (triangles, stencils) = match smoothing {
-            Smoothing::None => {
-                (disc.triangles.clone(), (0..disc.points.len()).map(|v| vec![(index(v), 1.0)]).collect())
+            Smoothing::None => (disc.triangles.clone(), None),
+            Smoothing::Loop => {
+                let (triangles, stencils) = subdivided(disc);
+                (triangles, Some(stencils))
             }
-            Smoothing::Loop => subdivided(disc),
         };
-        let points: Vec<Point> = mean(&stencils, &disc.points).collect();
+        let points = refined(stencils.as_ref(), &disc.points);
         let radius = points.iter().map(|[x, y]| (x * x + y * y).sqrt().min(1.0)).collect();
         let flat = Sheet::new(points.iter().map(|&[x, y]| [x, y, 0.0]).collect(), points, radius, triangles);
-        let rim = rim(&flat.edges);
+        let rim = rim_sides(&flat);
         Refinement { flat, stencils, rim }
     }
 
     pub(crate) fn apply(&self, vertices: &[Vertex], rest: &[Point]) -> Sheet {
-        let (vertices, rest) = (mean(&self.stencils, vertices).collect(), mean(&self.stencils, rest).collect());
+        let stencils = self.stencils.as_ref();
+        let (vertices, rest) = (refined(stencils, vertices), refined(stencils, rest));
         let Sheet { radius, triangles, edges, .. } = &self.flat;
         Sheet { vertices, rest, radius: Arc::clone(radius), triangles: Arc::clone(triangles), edges: Arc::clone(edges) }
     }
@@ -47,36 +62,55 @@ impl Refinement {
     pub(crate) fn snap_rim(&self, sheet: &mut Sheet, outline: &Outline, offset: f64) {
         let count = self.rim.len();
         let radius = Arc::make_mut(&mut sheet.radius);
-        for (&(v, _), p) in self.rim.iter().zip(outline.resampled(count, offset)) {
-            sheet.vertices[v as usize][0] = p[0];
-            sheet.vertices[v as usize][1] = p[1];
-            radius[v as usize] = 1.0;
+        for (side, [x, y]) in self.rim.iter().zip(outline.resampled(count, offset)) {
+            let v = side.start as usize;
+            [sheet.vertices[v][0], sheet.vertices[v][1], radius[v]] = [x, y, 1.0];
         }
         for corners in outline.corners(count, offset).chunk_by(|a, b| a.0 == b.0) {
             self.fan(sheet, corners);
         }
-        sheet.update_edges();
     }
 
     /// Divides the triangle at the rim side with these corners into a fan, with one more triangle for each corner.
     fn fan(&self, sheet: &mut Sheet, corners: &[(usize, f64, Point)]) {
-        let side = corners[0].0;
-        let ((a, triangle), (b, _)) = (self.rim[side], self.rim[(side + 1) % self.rim.len()]);
-        let old = sheet.triangles[triangle as usize];
-        let Some(&apex) = old.iter().find(|&&v| v != a && v != b) else { return };
+        let number = corners[0].0;
+        let RimSide { start: a, triangle, edge, spoke } = self.rim[number];
+        let b = self.rim[(number + 1) % self.rim.len()].start;
+        let triangles = Arc::make_mut(&mut sheet.triangles);
+        let edges = Arc::make_mut(&mut sheet.edges);
+        let radius = Arc::make_mut(&mut sheet.radius);
+        let Some(&apex) = triangles[triangle as usize].iter().find(|&&v| v != a && v != b) else { return };
         let (ra, rb) = (sheet.rest[a as usize], sheet.rest[b as usize]);
         let (za, zb) = (sheet.vertices[a as usize][2], sheet.vertices[b as usize][2]);
-        let mut last = a;
+        // The edge from `last` to `apex`.
+        let (mut last, mut open) = (a, spoke);
         for &(_, part, [x, y]) in corners.iter().filter(|c| (MERGE_DISTANCE..=1.0 - MERGE_DISTANCE).contains(&c.1)) {
-            let new = index(sheet.vertices.len());
+            let (vertex, new) = (index(sheet.vertices.len()), index(triangles.len()));
             sheet.vertices.push([x, y, za + part * (zb - za)]);
             sheet.rest.push([ra[0] + part * (rb[0] - ra[0]), ra[1] + part * (rb[1] - ra[1])]);
-            Arc::make_mut(&mut sheet.radius).push(1.0);
-            Arc::make_mut(&mut sheet.triangles).push([last, new, apex]);
-            last = new;
+            radius.push(1.0);
+            triangles.push([last, vertex, apex]);
+            for side in edges[open].sides.iter_mut().filter(|side| **side == triangle) {
+                *side = new;
+            }
+            open = edges.len() + 1;
+            edges.extend([Edge::new([last, vertex], [new, OUTSIDE]), Edge::new([vertex, apex], [new, triangle])]);
+            last = vertex;
         }
-        Arc::make_mut(&mut sheet.triangles)[triangle as usize] = [last, b, apex];
+        triangles[triangle as usize] = [last, b, apex];
+        edges[edge] = Edge::new([last, b], [triangle, OUTSIDE]);
     }
+}
+
+fn rim_sides(flat: &Sheet) -> Vec<RimSide> {
+    let rim = rim(&flat.edges);
+    let ends = rim.iter().cycle().skip(1).map(|side| side.0);
+    let find = |a: u32, b: u32| flat.edges.iter().position(|e| e.ends == [a.min(b), a.max(b)]).unwrap_or_default();
+    let side = |(&(start, triangle), end): (&(u32, u32), u32)| {
+        let third = flat.triangles[triangle as usize].iter().copied().find(|&v| v != start && v != end);
+        RimSide { start, triangle, edge: find(start, end), spoke: find(start, third.unwrap_or_default()) }
+    };
+    rim.iter().zip(ends).map(side).collect()
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "counts far below 2^32")]
@@ -84,10 +118,10 @@ pub(crate) fn index(value: usize) -> u32 {
     value as u32
 }
 
-/// For each vertex of the final mesh, the solver's vertices and their weights.
-type Stencils = Vec<Vec<(u32, f64)>>;
+/// For each vertex of one mesh, vertices of another and their weights.
+pub(crate) type Stencils = Vec<Vec<(u32, f64)>>;
 
-fn mean<const D: usize>(stencils: &Stencils, values: &[[f64; D]]) -> impl Iterator<Item = [f64; D]> {
+pub(crate) fn mean<const D: usize>(stencils: &Stencils, values: &[[f64; D]]) -> impl Iterator<Item = [f64; D]> {
     stencils.iter().map(|stencil| {
         let mut sum = [0.0; D];
         for &(v, weight) in stencil {
@@ -97,6 +131,10 @@ fn mean<const D: usize>(stencils: &Stencils, values: &[[f64; D]]) -> impl Iterat
         }
         sum
     })
+}
+
+fn refined<const D: usize>(stencils: Option<&Stencils>, values: &[[f64; D]]) -> Vec<[f64; D]> {
+    stencils.map_or_else(|| values.to_vec(), |stencils| mean(stencils, values).collect())
 }
 
 /// Applies one step of Loop's subdivision inside (Loop 1987), and halves the sides of the rim. It is linear, so that a
@@ -132,4 +170,27 @@ fn subdivided(disc: &Disc) -> (Vec<[u32; 3]>, Stencils) {
         [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
     };
     (disc.triangles.iter().flat_map(quarters).collect(), stencils)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{angular, rng, wavy};
+    use crate::{Cloth, ClothParams};
+
+    #[test]
+    fn edges_of_the_snapped_rim_are_those_of_its_triangles() {
+        // In the small mesh, some triangles have two sides on the rim.
+        for (vertices, smoothing) in [(32, Smoothing::None), (300, Smoothing::None), (32, Smoothing::Loop)] {
+            let cloth = Cloth::new(&ClothParams { vertices, smoothing, ..ClothParams::default() }).unwrap();
+            for outline in [wavy(3.0, 0.2), angular()] {
+                let sheet = cloth.crumple(&outline, &mut rng(1)).unwrap();
+                let sorted = |mut edges: Vec<Edge>| {
+                    edges.sort_unstable_by_key(|e| e.ends);
+                    edges
+                };
+                assert_eq!(sorted(sheet.edges.to_vec()), sorted(edges(&sheet.triangles, sheet.vertices.len())));
+            }
+        }
+    }
 }

@@ -1,6 +1,6 @@
 //! The flat sheet before it is crumpled, and the start of its outline.
 
-use crate::batch::Start;
+use crate::batch::{Flat, Start};
 use crate::mesh::Disc;
 use crate::outline::{Outline, moments};
 use crate::sheet::cross;
@@ -55,7 +55,7 @@ pub(crate) fn start<R: Rng + ?Sized>(
         Solver::Xpbd(p) => (p.lift, disc.rim),
     };
     let heights = (0..rest.len()).map(|v| if v < held { 0.0 } else { lift * uniform(rng) }).collect();
-    Start { shape, offset, rest, heights, outline: [from, target] }
+    Start { shape, offset, flat: Flat { rest, heights, outline: [from, target] } }
 }
 
 /// Returns the paper's start: a disc, rotated so that its rim is close to the points of the outline.
@@ -139,8 +139,11 @@ fn expanded<R: Rng + ?Sized>(target: &[Point], area_ratio: f64, rng: &mut R) -> 
         let mut depth = PUSH_EVERYWHERE + PUSH_INTO_NOTCH * notch.max(0.0);
         for [at, width, most] in pushes {
             let apart = (k as f64 / count as f64 - at).abs();
-            let bell = libm::cos(0.5 * PI * (apart.min(1.0 - apart) / width).min(1.0));
-            depth += most * bell * bell;
+            let part = apart.min(1.0 - apart) / width;
+            if part < 1.0 {
+                let bell = libm::cos(0.5 * PI * part);
+                depth += most * bell * bell;
+            }
         }
         [n[0] * depth, n[1] * depth]
     };
@@ -180,7 +183,7 @@ fn mapped_into(disc: &Disc, curve: &[Point], area_ratio: f64) -> Vec<Point> {
 }
 
 /// Returns the point at the fraction `k / count` of the curve's points.
-fn interpolated(curve: &[Point], k: usize, count: usize) -> Point {
+pub(crate) fn interpolated(curve: &[Point], k: usize, count: usize) -> Point {
     let whole = k * curve.len() / count;
     let part = (k * curve.len() % count) as f64 / count as f64;
     let (a, b) = (curve[whole], curve[(whole + 1) % curve.len()]);

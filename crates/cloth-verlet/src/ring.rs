@@ -154,30 +154,19 @@ impl<const L: usize> MovingOutline<L> {
     fn measure(&mut self) -> Lane<L> {
         let count = self.points.len();
         let mut fastest = Lane::ZERO;
+        let (_, mut previous) = side(&self.points[count - 1], &self.points[0]);
         for k in 0..count {
             let (a, b) = (self.points[k], self.points[if k + 1 < count { k + 1 } else { 0 }]);
-            let corner = &mut self.corners[k];
+            let (inverse, own) = side(&a, &b);
+            let at = self.corners[k].at;
+            let mut normal = previous;
             for l in 0..L {
-                let (mx, my) = (a[0][l] - corner.at[0][l], a[1][l] - corner.at[1][l]);
+                let (mx, my) = (a[0][l] - at[0][l], a[1][l] - at[1][l]);
                 fastest[l] = at_least(fastest[l], mx * mx + my * my);
-                let (ux, uy) = (b[0][l] - a[0][l], b[1][l] - a[1][l]);
-                let inverse = 1.0 / (ux * ux + uy * uy + TINY);
-                let unit = inverse.sqrt();
-                corner.inverse[l] = inverse;
-                // First the normal of the side; corners are averaged below.
-                corner.normal[0][l] = uy * unit;
-                corner.normal[1][l] = -(ux * unit);
+                normal[0][l] += own[0][l];
+                normal[1][l] += own[1][l];
             }
-            corner.at = a;
-        }
-        let mut previous = self.corners[count - 1].normal;
-        for corner in &mut self.corners[..count] {
-            let own = corner.normal;
-            for axis in 0..2 {
-                for l in 0..L {
-                    corner.normal[axis][l] = previous[axis][l] + own[axis][l];
-                }
-            }
+            self.corners[k] = Corner { at: a, normal, inverse };
             previous = own;
         }
         self.corners[count] = self.corners[0];
@@ -186,6 +175,20 @@ impl<const L: usize> MovingOutline<L> {
         }
         Lane(fastest.0.map(|square| square.sqrt() * APPROACH.0 + APPROACH.1))
     }
+}
+
+/// Returns 1 / length² and the outward unit normal of the side from `a` to `b`.
+#[inline(always)]
+fn side<const L: usize>(a: &[Lane<L>; 2], b: &[Lane<L>; 2]) -> (Lane<L>, [Lane<L>; 2]) {
+    let (mut inverse, mut normal) = (Lane::ZERO, [Lane::ZERO; 2]);
+    for l in 0..L {
+        let (ux, uy) = (b[0][l] - a[0][l], b[1][l] - a[1][l]);
+        inverse[l] = 1.0 / (ux * ux + uy * uy + TINY);
+        let unit = inverse[l].sqrt();
+        normal[0][l] = uy * unit;
+        normal[1][l] = -(ux * unit);
+    }
+    (inverse, normal)
 }
 
 /// Returns the corners of the sides of a group, and the next one.

@@ -25,6 +25,11 @@ pub(crate) struct Edge {
 }
 
 impl Edge {
+    /// Returns the edge between two vertices with the triangles on the left and right of the way from `a` to `b`.
+    pub(crate) fn new([a, b]: [u32; 2], [left, right]: [u32; 2]) -> Edge {
+        if a < b { Edge { ends: [a, b], sides: [left, right] } } else { Edge { ends: [b, a], sides: [right, left] } }
+    }
+
     /// Returns the third corners of the one or two triangles, in the order of the triangles.
     pub(crate) fn opposite(&self, triangles: &[[u32; 3]]) -> Vec<u32> {
         let mut sides = self.sides;
