@@ -6,7 +6,9 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use papsynth::Threads;
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Layout, Location, Progress, Run, Task, missing_shards};
+use papsynth_dataset::{
+    Check, Dataset, DatasetInfo, Extra, Format, Layout, Location, Progress, Run, Task, missing_shards,
+};
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyDict, PyList};
 
@@ -21,7 +23,7 @@ const MAX_FRAMES: u64 = 1_000_000_000;
 
 /// Generates frames for `papsynth.generate` and returns the numbers of frames "written" and "present".
 #[pyfunction]
-#[pyo3(signature = (engine, out, frames, seed=0, *, task=(0, 1), formats=None, frames_per_shard=None, scenes=false, threads=1, verify=false, progress=None))]
+#[pyo3(signature = (engine, out, frames, seed=0, *, task=(0, 1), formats=None, frames_per_shard=None, without=None, scenes=false, threads=1, verify=false, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
 pub(crate) fn generate<'py>(
     py: Python<'py>,
@@ -32,6 +34,7 @@ pub(crate) fn generate<'py>(
     task: (u64, u64),
     formats: Option<Vec<String>>,
     frames_per_shard: Option<u64>,
+    without: Option<Vec<String>>,
     scenes: bool,
     threads: usize,
     verify: bool,
@@ -47,7 +50,7 @@ pub(crate) fn generate<'py>(
             return Err(wrong(format!("{name}: 0 is out of range: expected 1 or more")));
         }
     }
-    let layout = Layout { scenes, ..layout(formats, frames_per_shard)? };
+    let layout = Layout { scenes, ..layout(formats, frames_per_shard, without)? };
     let info = DatasetInfo {
         recipe: made_by.engine.recipe(),
         model: &made_by.model,
@@ -115,19 +118,31 @@ fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
-fn layout(formats: Option<Vec<String>>, frames_per_shard: Option<u64>) -> PyResult<Layout> {
+fn layout(
+    formats: Option<Vec<String>>,
+    frames_per_shard: Option<u64>,
+    without: Option<Vec<String>>,
+) -> PyResult<Layout> {
     let formats: Vec<Format> = match formats {
         None => vec![Format::Folder],
         Some(names) => names.iter().map(|name| format(name)).collect::<PyResult<_>>()?,
     };
-    let mut layout = Layout::new(formats);
+    let without: Vec<Extra> = without.iter().flatten().map(|name| extra(name)).collect::<PyResult<_>>()?;
+    let mut layout = Layout::new(formats).without(without);
     if let Some(frames) = frames_per_shard {
         if !(1..=1_000_000).contains(&frames) {
             return Err(wrong(format!("frames_per_shard: {frames} is out of range: expected 1 to 1000000")));
         }
         layout.frames_per_shard = frames;
     }
-    Ok(layout)
+    layout.refusal().map_or(Ok(layout), |message| Err(wrong(format!("without: {message}"))))
+}
+
+fn extra(name: &str) -> PyResult<Extra> {
+    Extra::ALL.into_iter().find(|extra| extra.name() == name).ok_or_else(|| {
+        let known = Extra::ALL.map(Extra::name).join(", ");
+        wrong(format!("without: unknown files `{name}`; expected some of {known}"))
+    })
 }
 
 fn format(name: &str) -> PyResult<Format> {
@@ -139,9 +154,14 @@ fn format(name: &str) -> PyResult<Format> {
 
 /// Returns the number of shards of a data set.
 #[pyfunction]
-#[pyo3(signature = (frames, formats=None, frames_per_shard=None))]
-pub(crate) fn shards(frames: u64, formats: Option<Vec<String>>, frames_per_shard: Option<u64>) -> PyResult<u64> {
-    Ok(frames.div_ceil(layout(formats, frames_per_shard)?.frames_per_shard))
+#[pyo3(signature = (frames, formats=None, frames_per_shard=None, without=None))]
+pub(crate) fn shards(
+    frames: u64,
+    formats: Option<Vec<String>>,
+    frames_per_shard: Option<u64>,
+    without: Option<Vec<String>>,
+) -> PyResult<u64> {
+    Ok(frames.div_ceil(layout(formats, frames_per_shard, without)?.frames_per_shard))
 }
 
 /// Completes a data set and returns its root hash.

@@ -114,6 +114,22 @@ def test_scenes_of_a_data_set_reproduce_its_frames(tmp_path):
     assert np.array_equal(again.image, papsynth.render(SMALL, seed=7, index=1).image)
 
 
+def test_data_sets_can_be_written_without_some_files(tmp_path):
+    papsynth.generate(SMALL, tmp_path / "all", 1)
+    papsynth.generate(SMALL, tmp_path / "few", 1, without=["noise-free", "layers", "contact-sheet"])
+    names = {}
+    for out in ("all", "few"):
+        papsynth.merge(tmp_path / out, 1)
+        assert not papsynth.verify(tmp_path / out, 1)["findings"]
+        names[out] = {str(path.relative_to(tmp_path / out)) for path in (tmp_path / out).rglob("*") if path.is_file()}
+    left_out = {"noise-free/000000.tif", "labels/layers/000000.tif", "contact-sheet.png"}
+    assert names["all"] - names["few"] == left_out and not names["few"] - names["all"]
+    papsynth.generate(SMALL, tmp_path / "one", 1, without="contact-sheet")
+    with pytest.raises(ValueError, match="without: .*`labels` cannot be left out"):
+        papsynth.generate(SMALL, tmp_path / "none", 1, formats=["folder", "stardist"], without=["labels"])
+    assert not (tmp_path / "none").exists()
+
+
 def test_data_sets_continue_and_list_missing_shards(tmp_path):
     seen = []
     first = papsynth.generate(SMALL, tmp_path / "set", 4, task=(0, 2), progress=seen.append)
@@ -128,7 +144,7 @@ def test_data_sets_continue_and_list_missing_shards(tmp_path):
     assert [path for path, _ in papsynth.verify(tmp_path / "set")["findings"]] == ["images/000002.png"]
     with pytest.raises(ValueError, match="seed"):
         papsynth.generate(SMALL, tmp_path / "set", 4, seed=1)
-    for wrong in ({"task": (2, 2)}, {"threads": 0}, {"formats": ["jpeg"]}, {"frames_per_shard": 0}):
+    for wrong in ({"task": (2, 2)}, {"threads": 0}, {"formats": ["jpeg"]}, {"frames_per_shard": 0}, {"without": "images"}):
         with pytest.raises(ValueError):
             papsynth.generate(SMALL, tmp_path / "none", 4, **wrong)
     with pytest.raises(OSError):

@@ -8,7 +8,7 @@ use crate::error::{Error, argument};
 use crate::sample::DataType;
 
 /// Compression level of zstd. Higher levels are slower and hardly improve the compression of noise.
-pub(crate) const ZSTD_LEVEL: i32 = 3;
+pub(crate) const ZSTD_LEVEL: i32 = 1;
 
 /// Grid index of a shard in its array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]

@@ -41,8 +41,8 @@ pub trait Sample: Copy + Default + PartialEq + sealed::Sealed {
     /// Data type.
     const KIND: DataType;
 
-    /// Appends the bytes in little-endian order.
-    fn put(self, out: &mut Vec<u8>);
+    /// Appends the bytes of values in little-endian order.
+    fn put(values: &[Self], out: &mut Vec<u8>);
 
     /// Reads a value from the start of a slice; 0 if the slice has less than [`DataType::bytes`] bytes.
     fn get(bytes: &[u8]) -> Self;
@@ -63,8 +63,13 @@ macro_rules! sample {
         impl Sample for $type {
             const KIND: DataType = DataType::$kind;
 
-            fn put(self, out: &mut Vec<u8>) {
-                out.extend_from_slice(&self.to_le_bytes());
+            fn put(values: &[Self], out: &mut Vec<u8>) {
+                let from = out.len();
+                out.resize(from + size_of_val(values), 0);
+                let (places, _) = out[from..].as_chunks_mut();
+                for (place, value) in places.iter_mut().zip(values) {
+                    *place = value.to_le_bytes();
+                }
             }
 
             fn get(bytes: &[u8]) -> Self {
@@ -72,6 +77,7 @@ macro_rules! sample {
             }
 
             #[expect(clippy::cast_possible_truncation, reason = "a mean is not larger than the largest value")]
+            #[inline]
             fn mean(of: [Self; 4]) -> Self {
                 $mean(of.map(Into::into)) as Self
             }
@@ -79,14 +85,10 @@ macro_rules! sample {
     };
 }
 
-sample!(u8, U8, mean);
-sample!(u16, U16, mean);
-sample!(u32, U32, mean);
+sample!(u8, U8, |[a, b, c, d]: [u32; 4]| (a + b + c + d + 2) / 4);
+sample!(u16, U16, |[a, b, c, d]: [u32; 4]| (a + b + c + d + 2) / 4);
+sample!(u32, U32, |[a, b, c, d]: [u64; 4]| (a + b + c + d + 2) / 4);
 sample!(f32, F32, |[a, b, c, d]: [f64; 4]| (a + b + c + d) / 4.0);
-
-fn mean(of: [u64; 4]) -> u64 {
-    (of.iter().sum::<u64>() + 2) / 4
-}
 
 /// Halves an image: each pixel is the mean of 2 x 2 pixels ([`Sample::mean`]).
 ///
@@ -109,11 +111,9 @@ fn by_fours<T: Sample>(values: &[T], width: usize, one: impl Fn([T; 4]) -> T) ->
     let rows: Vec<&[T]> = values.chunks_exact(width).collect();
     let mut half = Vec::with_capacity(width.div_ceil(2) * rows.len().div_ceil(2));
     for pair in rows.chunks(2) {
-        let (upper, lower) = (pair[0], pair[pair.len() - 1]);
-        for (above, below) in upper.chunks(2).zip(lower.chunks(2)) {
-            let last = above.len() - 1;
-            half.push(one([above[0], above[last], below[0], below[last]]));
-        }
+        let [(upper, upper_rest), (lower, lower_rest)] = [pair[0], pair[pair.len() - 1]].map(<[T]>::as_chunks);
+        half.extend(upper.iter().zip(lower).map(|(&[a, b], &[c, d])| one([a, b, c, d])));
+        half.extend(upper_rest.iter().zip(lower_rest).map(|(&above, &below)| one([above, above, below, below])));
     }
     half
 }

@@ -76,8 +76,8 @@ impl ShardEncoder {
                 chunk.clear();
                 // Outside the array, values are 0.
                 for line in values.chunks_exact(width).skip(row * side).take(side) {
-                    line[columns.clone()].iter().for_each(|value| value.put(&mut chunk));
-                    (columns.len()..side).for_each(|_| T::default().put(&mut chunk));
+                    T::put(&line[columns.clone()], &mut chunk);
+                    chunk.resize(chunk.len() + (side - columns.len()) * T::KIND.bytes(), 0);
                 }
                 chunk.resize(array.chunk_bytes(), 0);
                 let packed = zstd.compress(&chunk)?;

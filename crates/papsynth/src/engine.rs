@@ -9,7 +9,7 @@ use crate::model::Model;
 use crate::phantom::PhantomAssets;
 use crate::profile::{Profile, Stage, StageTimer};
 use crate::recipe::Recipe;
-use crate::render::{FrameBuffers, Rendering};
+use crate::render::{FrameBuffers, Rendering, phantoms};
 use crate::scene::{self, Scene, WeightMap};
 use crate::threads::Threads;
 use crate::transmit::MicroscopeCache;
@@ -101,8 +101,11 @@ impl Engine {
         let index = scene.key.index;
         let fail = |cause| E::from(Error::Image { index, cause });
         self.with_buffers(|buffers| {
+            let noise_fields = self.assets.noise_fields.fields(scene.key);
+            let objects: Vec<_> = scene.objects.iter().collect();
+            let phantoms = phantoms(&self.assets, &noise_fields, &scene, &objects, threads).map_err(fail)?;
             let mut rendering =
-                Rendering::new(&self.assets, &self.microscopes, scene, threads, buffers).map_err(fail)?;
+                Rendering::new(&self.assets, &self.microscopes, scene, phantoms, threads, buffers).map_err(fail)?;
             for plane in 0..rendering.planes() {
                 sink(rendering.plane(plane, buffers).map_err(fail)?)?;
             }

@@ -8,7 +8,7 @@ use crate::error::ErrorKind;
 use crate::frame::{Finished, Plane};
 use crate::fuse;
 use crate::phantom::tile::overlay;
-use crate::phantom::{self, Phantom, PhantomAssets, Piece};
+use crate::phantom::{self, NoiseFields, Phantom, PhantomAssets, Piece};
 use crate::profile::{Stage, StageTimer};
 use crate::recipe::Restore;
 use crate::scene::{Body, Object, Scene, View};
@@ -40,28 +40,43 @@ pub(crate) struct Rendering {
     timer: StageTimer,
 }
 
+/// Draws the phantoms of objects of a scene, in their order.
+pub(crate) fn phantoms(
+    assets: &PhantomAssets,
+    noise_fields: &NoiseFields,
+    scene: &Scene,
+    objects: &[&Object],
+    threads: Threads,
+) -> Result<Vec<Phantom>, ErrorKind> {
+    // Cells come first, so that their batches are full.
+    let mut order: Vec<usize> = (0..objects.len()).collect();
+    order.sort_by_key(|&number| !matches!(objects[number].body, Body::Cell(_)));
+    let ordered: Vec<&Object> = order.iter().map(|&number| objects[number]).collect();
+    let batches: Vec<&[&Object]> = ordered.chunks(phantom::BATCH).collect();
+    let mut drawn: Vec<Phantom> = Vec::with_capacity(objects.len());
+    for batch in threads::map(threads, &batches, |batch| phantom::make(assets, scene, noise_fields, batch)) {
+        drawn.extend(batch?);
+    }
+    if scene.frame.is_some() {
+        let (view, n) = (scene.view, scene.oversampling());
+        drawn = drawn.into_iter().zip(ordered).map(|(phantom, object)| phantom.on_slide(object, view, n)).collect();
+    }
+    let mut numbered: Vec<(usize, Phantom)> = order.into_iter().zip(drawn).collect();
+    numbered.sort_unstable_by_key(|(number, _)| *number);
+    Ok(numbered.into_iter().map(|(_, phantom)| phantom).collect())
+}
+
 impl Rendering {
+    /// Prepares a scene whose objects have these phantoms.
     pub(crate) fn new(
         assets: &PhantomAssets,
         microscopes: &MicroscopeCache,
         scene: Scene,
+        mut phantoms: Vec<Phantom>,
         threads: Threads,
         buffers: &mut FrameBuffers,
     ) -> Result<Self, ErrorKind> {
         let timer = assets.timer.clone();
-        let noise_fields = assets.noise_fields.fields(scene.key);
-        let objects: Vec<&Object> = scene.objects.iter().collect();
-        let batches: Vec<&[&Object]> = objects.chunks(phantom::BATCH).collect();
-        let made = threads::map(threads, &batches, |batch| phantom::make(assets, &scene, &noise_fields, batch));
-        let mut phantoms: Vec<Phantom> = Vec::with_capacity(objects.len());
-        for batch in made {
-            phantoms.extend(batch?);
-        }
-        if scene.frame.is_some() {
-            let (view, n) = (scene.view, scene.oversampling());
-            let moved = scene.objects.iter().zip(phantoms).map(|(object, phantom)| phantom.on_slide(object, view, n));
-            phantoms = moved.collect();
-        }
         timer.time(Stage::Masks, || {
             let (view, n) = (scene.view, scene.oversampling());
             let mask = |piece: &Piece| mask_of(piece, n, [0; 2], [view.width, view.height]);

@@ -6,17 +6,23 @@
 //! frames join without seams. A part of the slide is cropped from the frames that it overlaps: its size and position do
 //! not change a pixel.
 
+mod cache;
+
+use std::ops::Range;
 use std::sync::Arc;
 
 use crate::engine::Engine;
 use crate::error::{Error, ErrorKind};
 use crate::key::Key;
+use crate::phantom::{NoiseFields, Phantom};
 use crate::recipe::{Imaging, InvalidField, Optics};
-use crate::render::Rendering;
+use crate::render::{FrameBuffers, Rendering, phantoms};
 use crate::scene::{BEYOND, Object, PLOT_PX, Plot, Population, Scene, SlideFrame, View};
 use crate::threads::{self, Threads};
 use crate::transmit::{self, LightPath};
-use crate::truth::{Group, LabelMap, ObjectTruth};
+use crate::truth::{Group, LabelMap, Mask, ObjectTruth, Truth};
+
+use cache::PhantomCache;
 
 /// A whole slide of the recipe and the model of an engine.
 ///
@@ -43,6 +49,9 @@ pub struct Slide<'a> {
     path: LightPath,
     /// Width of the border around a frame that is exposed and cropped, pixels.
     border_px: i64,
+    /// The noise fields of all frames.
+    noise_fields: NoiseFields<'a>,
+    cache: PhantomCache,
 }
 
 impl core::fmt::Debug for Slide<'_> {
@@ -126,7 +135,9 @@ impl<'a> Slide<'a> {
             );
             return Err(fail("scan.max_object_radius_um", message));
         }
-        Ok(Self { engine, number, population, empty, path, border_px })
+        let noise_fields = engine.assets.noise_fields.fields(empty.key);
+        let cache = PhantomCache::default();
+        Ok(Self { engine, number, population, empty, path, border_px, noise_fields, cache })
     }
 
     /// Returns the columns and rows of the slide.
@@ -214,9 +225,7 @@ impl<'a> Slide<'a> {
                 let at = [column, row];
                 let plot: Arc<Vec<Object>> = self.population.plot(at)?;
                 for object in plot.iter() {
-                    let reach_px = object.body.reach_um(pixel_um) / pixel_um + 3.0;
-                    let spread_px = self.path.object_blur_radius_px(&self.empty, object.depth_um)?;
-                    let reach_px = reach_px + spread_px as f64;
+                    let reach_px = self.reach_px(object)?;
                     if reach_px > halo as f64 {
                         let (kind, reach_um) = (object.body.kind().name(), reach_px * pixel_um);
                         return Err(ErrorKind::TooFar { kind, reach_um, most_um });
@@ -236,6 +245,33 @@ impl<'a> Slide<'a> {
         Ok(found)
     }
 
+    /// Returns the distance from the centre of an object to the edge of its blurred image, at most.
+    fn reach_px(&self, object: &Object) -> Result<f64, ErrorKind> {
+        let spread_px = self.path.object_blur_radius_px(&self.empty, object.depth_um)?;
+        Ok(object.body.reach_um(self.pixel_um()) / self.pixel_um() + 3.0 + spread_px as f64)
+    }
+
+    /// Returns the phantoms of the objects of frame `at`. Those that also reach into the next frames are cached.
+    fn phantoms(&self, at: [u32; 2], scene: &Scene, threads: Threads) -> Result<Vec<Phantom>, ErrorKind> {
+        let n = scene.oversampling();
+        let mut found: Vec<Option<Phantom>> = scene.objects.iter().map(|object| self.cache.get(object, n)).collect();
+        let missing = scene.objects.iter().zip(&found).filter(|(_, found)| found.is_none());
+        let missing: Vec<&Object> = missing.map(|(object, _)| object).collect();
+        let drawn = phantoms(&self.engine.assets, &self.noise_fields, scene, &missing, threads)?;
+        let (side, frames) = (f64::from(self.side_px()), self.frames());
+        for (place, (object, phantom)) in
+            found.iter_mut().filter(|found| found.is_none()).zip(missing.iter().zip(drawn))
+        {
+            let (centre_um, reach_px) = (scene.place_um(object), self.reach_px(object)?);
+            let is_beyond = |axis: usize| centre_um[axis] / scene.view.pixel_um + reach_px > side;
+            if (0..2).any(|axis| at[axis] + 1 < frames[axis] && is_beyond(axis)) {
+                self.cache.insert(object, &phantom);
+            }
+            *place = Some(phantom);
+        }
+        Ok(found.into_iter().flatten().collect())
+    }
+
     /// Returns a frame, cropped to the slide.
     ///
     /// # Errors
@@ -245,7 +281,10 @@ impl<'a> Slide<'a> {
         if at[0] >= frames[0] || at[1] >= frames[1] {
             return Err(self.fail(ErrorKind::NoFrame(at, frames)));
         }
-        self.expose(at, [0, 0], self.size_px(), threads, true).map_err(|cause| self.fail(cause))
+        let exposed = self.expose(at, [0, 0], self.size_px(), threads, true).map_err(|cause| self.fail(cause))?;
+        let mut part = SlidePart::blank(exposed.origin_px, exposed.size_px, self.planes_um(), self.channels(), true);
+        part.lay(exposed, self.channels());
+        Ok(part)
     }
 
     /// Returns the intersection of a part of the slide with a frame.
@@ -256,7 +295,7 @@ impl<'a> Slide<'a> {
         size_px: [u32; 2],
         threads: Threads,
         noise_free: bool,
-    ) -> Result<SlidePart, ErrorKind> {
+    ) -> Result<Exposed, ErrorKind> {
         let (side, pixel_um, slide_px) = (self.side_px(), self.pixel_um(), self.size_px());
         let end_px = [0, 1].map(|axis| (origin_px[axis] + size_px[axis]).min((at[axis] * side).saturating_add(side)));
         let origin_px = [0, 1].map(|axis| origin_px[axis].max(at[axis] * side));
@@ -278,8 +317,10 @@ impl<'a> Slide<'a> {
                 at >= 0.0 && at < f64::from(size_px[axis])
             })
         };
-        self.engine.with_buffers(|buffers| {
-            let mut rendering = Rendering::new(&self.engine.assets, &self.engine.microscopes, scene, threads, buffers)?;
+        let phantoms = self.phantoms(at, &scene, threads)?;
+        self.engine.with_buffers(|buffers: &mut FrameBuffers| {
+            let Engine { assets, microscopes, .. } = self.engine;
+            let mut rendering = Rendering::new(assets, microscopes, scene, phantoms, threads, buffers)?;
             let mut planes = Vec::new();
             for index in 0..rendering.planes() {
                 let plane = rendering.plane(index, buffers)?;
@@ -290,9 +331,7 @@ impl<'a> Slide<'a> {
                 });
             }
             let (truth, objects) = rendering.slide_truth(slide_px, within, buffers);
-            let map = |group| LabelMap { width: cut.size[0], ids: cut.of(&truth.labels(group).ids, 1) };
-            let labels = Group::ALL.map(map).to_vec();
-            Ok(SlidePart { origin_px, size_px, planes, labels, layers: cut.of(&truth.layers(), 1), objects })
+            Ok(Exposed { origin_px, size_px, planes, truth, cut, objects })
         })
     }
 
@@ -342,6 +381,17 @@ impl<'a> Slide<'a> {
     }
 }
 
+/// A frame, cropped to a part.
+struct Exposed {
+    origin_px: [u32; 2],
+    size_px: [u32; 2],
+    planes: Vec<PartPlane>,
+    /// Ground truth of the frame with its border.
+    truth: Truth,
+    cut: Cut,
+    objects: Vec<ObjectTruth>,
+}
+
 impl SlidePart {
     fn blank(origin_px: [u32; 2], size_px: [u32; 2], planes_um: &[f64], channels: usize, noise_free: bool) -> Self {
         let pixels = size_px[0] as usize * size_px[1] as usize;
@@ -355,31 +405,38 @@ impl SlidePart {
             origin_px,
             size_px,
             planes: planes_um.iter().map(plane).collect(),
-            labels: labels.to_vec(),
+            labels: labels.into(),
             layers: vec![0; pixels],
             objects: Vec::new(),
         }
     }
 
-    /// Copies a part that is inside this part.
-    fn lay(&mut self, other: Self, channels: usize) {
-        let [x, y] = [0, 1].map(|axis| (other.origin_px[axis] - self.origin_px[axis]) as usize);
-        let (width, columns) = (self.size_px[0] as usize, other.size_px[0] as usize);
-        let place = [y * width + x, width, columns];
-        fn copy<T: Copy>(to: &mut [T], from: &[T], [at, width, columns]: [usize; 3], channels: usize) {
-            for (row, from) in from.chunks_exact(columns * channels).enumerate() {
-                to[(at + row * width) * channels..][..from.len()].copy_from_slice(from);
+    /// Copies a cropped frame that is inside this part.
+    fn lay(&mut self, exposed: Exposed, channels: usize) {
+        let [x, y] = [0, 1].map(|axis| (exposed.origin_px[axis] - self.origin_px[axis]) as usize);
+        let (width, columns) = (self.size_px[0] as usize, exposed.cut.size[0]);
+        let at = y * width + x;
+        fn copy<T: Copy>(to: &mut [T], from: &[T], [at, width, columns]: [usize; 3]) {
+            for (row, from) in from.chunks_exact(columns).enumerate() {
+                to[at + row * width..][..columns].copy_from_slice(from);
             }
         }
-        for (plane, others) in self.planes.iter_mut().zip(&other.planes) {
-            copy(&mut plane.grey, &others.grey, place, channels);
-            copy(&mut plane.noise_free, &others.noise_free, place, channels);
+        let place = [at, width, columns].map(|pixels| pixels * channels);
+        for (plane, others) in self.planes.iter_mut().zip(&exposed.planes) {
+            copy(&mut plane.grey, &others.grey, place);
+            copy(&mut plane.noise_free, &others.noise_free, place);
         }
-        for (labels, others) in self.labels.iter_mut().zip(&other.labels) {
-            copy(&mut labels.ids, &others.ids, place, 1);
+        for object in &exposed.truth.objects {
+            let group = Group::ALL.iter().position(|group| *group == object.group()).unwrap_or_default();
+            let ids = &mut self.labels[group].ids[at..];
+            exposed.cut.for_each_run(&object.visible, width, |run| ids[run].fill(object.id));
+            if object.group() == Group::Cytoplasm {
+                let layers = &mut self.layers[at..];
+                let add = |layer: &mut u16| *layer = layer.saturating_add(1);
+                exposed.cut.for_each_run(&object.amodal, width, |run| layers[run].iter_mut().for_each(add));
+            }
         }
-        copy(&mut self.layers, &other.layers, place, 1);
-        self.objects.extend(other.objects);
+        self.objects.extend(exposed.objects);
     }
 }
 
@@ -395,7 +452,51 @@ struct Cut {
 
 impl Cut {
     fn of<T: Copy>(&self, values: &[T], channels: usize) -> Vec<T> {
-        let rows = values.chunks_exact(self.whole * channels).skip(self.first[1]).take(self.size[1]);
-        rows.flat_map(|row| &row[self.first[0] * channels..][..self.size[0] * channels]).copied().collect()
+        let mut cropped = Vec::with_capacity(self.size[0] * self.size[1] * channels);
+        for row in values.chunks_exact(self.whole * channels).skip(self.first[1]).take(self.size[1]) {
+            cropped.extend_from_slice(&row[self.first[0] * channels..][..self.size[0] * channels]);
+        }
+        cropped
+    }
+
+    /// Visits the runs of a mask of the frame that are inside the crop, as ranges of an image with `width` columns
+    /// whose first pixel is that of the crop.
+    fn for_each_run(&self, mask: &Mask, width: usize, mut visit: impl FnMut(Range<usize>)) {
+        let [left, top] = self.first;
+        for run in mask.runs() {
+            let Some(row) = (run.y as usize).checked_sub(top).filter(|row| *row < self.size[1]) else { continue };
+            let [from, to] = [run.x0, run.x1].map(|x| (x as usize).clamp(left, left + self.size[0]) - left);
+            if from < to {
+                visit(row * width + from..row * width + to);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::truth::Run;
+
+    #[test]
+    fn runs_are_clipped_to_a_crop() {
+        let runs = vec![
+            Run { y: 0, x0: 0, x1: 9 },
+            Run { y: 2, x0: 0, x1: 3 },
+            Run { y: 2, x0: 4, x1: 6 },
+            Run { y: 3, x0: 0, x1: 9 },
+            Run { y: 4, x0: 7, x1: 9 },
+            Run { y: 5, x0: 4, x1: 5 },
+        ];
+        let cut = Cut { first: [2, 2], whole: 9, size: [4, 3] };
+        let mut image = vec![0; 3 * 10];
+        cut.for_each_run(&Mask::from_runs(runs.clone()), 10, |run| image[run].iter_mut().for_each(|pixel| *pixel += 1));
+        let is_in = |x: usize, y: usize| {
+            runs.iter().any(|run| run.y as usize == y && (run.x0 as usize..run.x1 as usize).contains(&x))
+        };
+        for (pixel, found) in image.iter().enumerate() {
+            let (x, y) = (pixel % 10, pixel / 10);
+            assert_eq!(*found, i32::from(x < 4 && is_in(x + 2, y + 2)), "{x} {y}");
+        }
     }
 }

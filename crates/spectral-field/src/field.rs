@@ -223,10 +223,11 @@ fn amplitudes(params: &FieldParams, grid: [usize; 2]) -> (Vec<f32>, Vec<usize>) 
     let half = height / 2 + 1;
     let mut power = Vec::with_capacity((width / 2 + 1) * half);
     let mut total = 0.0;
+    let along: Vec<f64> = (0..half).map(|ky| ky as f64 / height as f64).collect();
+    let mut folded = vec![0.0; half];
     for kx in 0..=width / 2 {
-        for ky in 0..half {
-            let frequency = [kx as f64 / width as f64, ky as f64 / height as f64];
-            let folded = params.spectrum.folded_density(frequency);
+        params.spectrum.folded_density(kx as f64 / width as f64, &along, &mut folded);
+        for (ky, &folded) in folded.iter().enumerate() {
             // The constant part of a power law is infinite and left out.
             let s = if folded.is_finite() { folded } else { 0.0 };
             let mirrors = |k, n| if is_self_mirrored(k, n) { 1.0 } else { 2.0 };

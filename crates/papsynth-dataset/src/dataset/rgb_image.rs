@@ -70,23 +70,21 @@ impl RgbImage {
     /// Draws an image, downscaled to `place`, and outlines over it.
     fn draw(&mut self, image: &LevelImage, white: u16, masks: &[(Group, Mask)], place: Place) {
         let (width, height, channels) = (image.width, image.height(), image.channels);
+        // Sums of the columns of a row of pixels.
+        let mut columns = vec![0_u32; width * channels];
         for y in 0..place.height {
             let rows = span(y, place.height, height);
+            columns.fill(0);
+            for row in image.levels.chunks_exact((width * channels).max(1)).skip(rows.start).take(rows.len()) {
+                columns.iter_mut().zip(row).for_each(|(sum, &level)| *sum += u32::from(level));
+            }
             for x in 0..place.width {
-                let columns = span(x, place.width, width);
+                let span = span(x, place.width, width);
                 let mut sums = [0_u64; 3];
-                for row in rows.clone() {
-                    let row = &image.levels[row * width * channels..];
-                    let row = &row[columns.start * channels..columns.end * channels];
-                    if channels == 1 {
-                        sums[0] += row.iter().map(|&level| u64::from(level)).sum::<u64>();
-                    } else {
-                        for pixel in row.chunks_exact(channels) {
-                            sums.iter_mut().zip(pixel).for_each(|(sum, &level)| *sum += u64::from(level));
-                        }
-                    }
+                for pixel in columns[span.start * channels..span.end * channels].chunks_exact(channels) {
+                    sums.iter_mut().zip(pixel).for_each(|(sum, &level)| *sum += u64::from(level));
                 }
-                let full = (rows.len() * columns.len()) as u64 * u64::from(white);
+                let full = (rows.len() * span.len()) as u64 * u64::from(white);
                 let mean = |sum: u64| u8::try_from((sum * 255 + full / 2) / full.max(1)).unwrap_or(u8::MAX);
                 let colour = if channels == 3 { sums.map(mean) } else { [mean(sums[0]); 3] };
                 self.set(place.x + x, place.y + y, colour);
@@ -274,6 +272,39 @@ mod tests {
             let expected: Vec<_> = all.iter().copied().filter(|&pixel| !is_inside(pixel)).collect();
             let found: Vec<_> = edge(&mask).into_iter().map(|pixel| pixel.map(|at| at as usize)).collect();
             prop_assert_eq!(found, expected);
+        }
+    }
+    proptest! {
+        #[test]
+        fn a_downscaled_pixel_is_the_mean_of_its_source_pixels(
+            [width, height] in [1_usize..40, 1..40],
+            [columns, rows] in [1_usize..40, 1..40],
+            channels in prop_oneof![Just(1_usize), Just(3)],
+            seed in 0_usize..1000,
+        ) {
+            let (columns, rows) = (columns.min(width), rows.min(height));
+            let level = |at: usize| u16::try_from((at * 7919 + seed * 104_729) % 4096).unwrap();
+            let levels: Vec<u16> = (0..width * height * channels).map(level).collect();
+            let image = LevelImage { width, channels, levels, white: 4095 };
+            let mut drawn = RgbImage::blank(columns + 2, rows + 1, BACKGROUND);
+            drawn.draw(&image, image.white, &[], Place { x: 1, y: 1, width: columns, height: rows });
+            for (pixel, found) in drawn.rgb.as_chunks::<3>().0.iter().enumerate() {
+                let (x, y) = (pixel % (columns + 2), pixel / (columns + 2));
+                let mut expected = BACKGROUND;
+                if (1..=columns).contains(&x) && y > 0 {
+                    for (channel, expected) in expected.iter_mut().enumerate() {
+                        let (mut sum, mut count) = (0, 0);
+                        for row in span(y - 1, rows, height) {
+                            for column in span(x - 1, columns, width) {
+                                sum += usize::from(image.levels[(row * width + column) * channels + channel % channels]);
+                                count += 4095;
+                            }
+                        }
+                        *expected = u8::try_from((sum * 255 + count / 2) / count).unwrap();
+                    }
+                }
+                prop_assert_eq!(*found, expected);
+            }
         }
     }
 }

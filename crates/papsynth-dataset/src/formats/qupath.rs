@@ -9,7 +9,7 @@ use super::sink::{Field, Files};
 use super::written::{Written, is_described};
 use crate::bytes;
 use crate::error::{Error, InputError};
-use crate::truth;
+use crate::truth::{self, Collection};
 
 pub(super) fn image(index: u64) -> String {
     format!("qupath/{index:06}.ome.tif")
@@ -19,7 +19,7 @@ fn objects(index: u64) -> String {
     format!("qupath/{index:06}.geojson")
 }
 
-fn collection(field: &Field) -> Value {
+fn collection(field: &Field) -> Collection {
     // An empty mask has no outline.
     let objects: Vec<&ObjectTruth> = field.truth.objects.iter().filter(|o| !o.amodal.is_empty()).collect();
     let (seed, index) = (field.seed, field.frame.index);
@@ -43,7 +43,10 @@ pub(super) fn check(written: &Written) -> Result<(), Error> {
     })?;
     written.file(&objects(field.frame.index), |bytes| {
         let found: Value = serde_json::from_slice(bytes)?;
-        InputError::unless(found == collection(field), "the features differ from the masks in coco.json")
+        InputError::unless(
+            found == serde_json::to_value(collection(field))?,
+            "the features differ from the masks in coco.json",
+        )
     })
 }
 

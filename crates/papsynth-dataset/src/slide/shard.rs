@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use papsynth::truth::{Group, ObjectTruth};
 use papsynth::{Slide, Threads};
 use papsynth_zarr::{Array, Pyramid, Sample, ShardEncoder, halved, halved_labels};
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::record::{LAYERS, folder};
 use super::set::{SlideSet, name_of, place, record_name};
@@ -14,7 +14,7 @@ use crate::dataset::Task;
 use crate::error::Error;
 use crate::files::{Check, FileRecord, Output};
 use crate::formats::parquet::Table;
-use crate::truth::{Row, collection, slide_columns, slide_table};
+use crate::truth::{Collection, Row, collection, slide_columns, slide_table};
 
 /// Options of [`SlideSet::generate`].
 #[derive(Debug, Clone, Copy)]
@@ -81,15 +81,14 @@ impl SlideSet {
         let mut files = Vec::new();
         let channels = self.head.channels;
         for (plane, picture) in part.planes.iter().enumerate() {
-            let layers: Vec<Vec<u16>> = (0..channels)
-                .map(|channel| picture.grey.iter().skip(channel).step_by(channels).copied().collect())
-                .collect();
+            let (pyramid, grey) = (&self.pyramids.image, &picture.grey);
             if self.head.bits <= 8 {
                 #[expect(clippy::cast_possible_truncation, reason = "grey levels of 8 bits")]
-                let layers = layers.iter().map(|layer| layer.iter().map(|grey| *grey as u8).collect()).collect();
-                files.extend(self.write_levels::<u8>(&self.pyramids.image, None, at, plane, layers, width, halved)?);
+                let layers = separated(grey, channels, |grey| grey as u8);
+                files.extend(self.write_levels(pyramid, None, at, plane, layers, width, halved)?);
             } else {
-                files.extend(self.write_levels(&self.pyramids.image, None, at, plane, layers, width, halved)?);
+                let layers = separated(grey, channels, |grey| grey);
+                files.extend(self.write_levels(pyramid, None, at, plane, layers, width, halved)?);
             }
         }
         for (group, labels) in Group::ALL.into_iter().zip(part.labels) {
@@ -116,7 +115,7 @@ impl SlideSet {
     }
 
     /// Returns the outlines of the objects of a shard as GeoJSON, in pixels of the slide.
-    fn outlines(&self, objects: &[ObjectTruth]) -> Value {
+    fn outlines(&self, objects: &[ObjectTruth]) -> Collection {
         let (seed, slide) = (self.head.identity.seed, self.head.slide);
         let name = |o: &ObjectTruth| format!("papsynth slide {seed} {slide} {} {:?}", o.id, o.part);
         let measure = |o: &ObjectTruth, _: Option<&ObjectTruth>| json!({ "Area µm^2": o.area_um2, "Depth µm": o.depth_um, "Mean absorbance": o.mean_absorbance });
@@ -166,5 +165,27 @@ impl SlideSet {
         }
         output.bytes(&encoder.end().map_err(bad)?)?;
         output.commit()
+    }
+}
+
+/// Converts interleaved channels to one image per channel.
+fn separated<T>(grey: &[u16], channels: usize, convert: impl Fn(u16) -> T) -> Vec<Vec<T>> {
+    let of_channel = |channel| grey.iter().skip(channel).step_by(channels).map(|grey| convert(*grey)).collect();
+    match channels {
+        // This is faster than a step of 1.
+        1 => vec![grey.iter().map(|grey| convert(*grey)).collect()],
+        _ => (0..channels).map(of_channel).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn channels_are_separated() {
+        let grey = [1, 2, 3, 4, 5, 6];
+        assert_eq!(separated(&grey, 1, |grey| grey), [grey]);
+        assert_eq!(separated(&grey, 3, |grey| 2 * grey), [[2, 8], [4, 10], [6, 12]]);
     }
 }

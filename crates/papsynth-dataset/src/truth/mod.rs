@@ -16,7 +16,7 @@ pub(crate) use frame::category_name;
 pub use frame::{Category, FrameSummary};
 pub use labels::Flatten;
 pub(crate) use labels::{LabelRuns, layers, overlaps};
-pub(crate) use polygon::{collection, outlines};
+pub(crate) use polygon::{Collection, collection, outlines};
 pub(crate) use splits::Split;
 #[cfg(feature = "parquet")]
 pub(crate) use table::{Cell, Head, Kind, part};

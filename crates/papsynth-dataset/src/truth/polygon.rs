@@ -2,6 +2,7 @@
 //! GeoJSON: a cell is one feature with its nucleus (`nucleusGeometry`), everything else is a detection.
 
 use papsynth::truth::{Mask, ObjectTruth, Part};
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::frame::category_name;
@@ -145,13 +146,38 @@ fn contains(ring: &Ring, [x, y]: [u32; 2]) -> bool {
     crossed.count() % 2 == 1
 }
 
+/// Features of objects as GeoJSON.
+#[derive(Debug, Serialize)]
+#[serde(tag = "type", rename = "FeatureCollection")]
+pub(crate) struct Collection {
+    features: Vec<Feature>,
+}
+
+#[derive(Debug, Serialize)]
+#[serde(tag = "type")]
+struct Feature {
+    id: String,
+    geometry: Shape,
+    properties: Value,
+    #[serde(rename = "nucleusGeometry", skip_serializing_if = "Option::is_none")]
+    nucleus: Option<Shape>,
+}
+
+/// The geometry of a mask.
+#[derive(Debug, Serialize)]
+#[serde(tag = "type", content = "coordinates")]
+enum Shape {
+    Polygon(Vec<Ring>),
+    MultiPolygon(Vec<Vec<Ring>>),
+}
+
 /// Returns the features of these objects. `name` returns a unique name, `measure` the measurements of an object and of
 /// its nucleus.
 pub(crate) fn collection(
     objects: &[&ObjectTruth],
     name: impl Fn(&ObjectTruth) -> String,
     measure: impl Fn(&ObjectTruth, Option<&ObjectTruth>) -> Value,
-) -> Value {
+) -> Collection {
     let find = |id: u32, part: Part| objects.iter().copied().find(|o| o.id == id && o.part == part);
     // A nucleus is part of its cell, if the image shows the cell.
     let own = objects.iter().filter(|o| o.part != Part::Nucleus || find(o.id, Part::Cytoplasm).is_none());
@@ -159,35 +185,31 @@ pub(crate) fn collection(
         let is_cell = object.part == Part::Cytoplasm;
         let nucleus = find(object.id, Part::Nucleus).filter(|_| is_cell);
         let class = if is_cell { object.class.clone() } else { category_name(&object.class, object.part) };
-        let mut feature = json!({
-            "type": "Feature",
-            "id": uuid(&name(object)),
-            "geometry": shape(&object.amodal),
-            "properties": {
+        Feature {
+            id: uuid(&name(object)),
+            geometry: shape(&object.amodal),
+            properties: json!({
                 "objectType": if is_cell { "cell" } else { "detection" },
                 "name": object.id.to_string(),
                 "classification": { "name": class },
                 "measurements": measure(object, nucleus),
-            },
-        });
-        if let (Some(nucleus), Some(feature)) = (nucleus, feature.as_object_mut()) {
-            feature.insert("nucleusGeometry".to_owned(), shape(&nucleus.amodal));
+            }),
+            nucleus: nucleus.map(|nucleus| shape(&nucleus.amodal)),
         }
-        feature
     });
-    json!({ "type": "FeatureCollection", "features": features.collect::<Vec<_>>() })
+    Collection { features: features.collect() }
 }
 
 /// Returns a polygon, or several if the mask has several parts.
-fn shape(mask: &Mask) -> Value {
+fn shape(mask: &Mask) -> Shape {
     let mut parts = polygons(mask);
     // GeoJSON repeats the first corner.
     for ring in parts.iter_mut().flatten() {
         ring.extend(ring.first().copied());
     }
-    match parts.as_slice() {
-        [one] => json!({ "type": "Polygon", "coordinates": one }),
-        _ => json!({ "type": "MultiPolygon", "coordinates": parts }),
+    match parts.len() {
+        1 => Shape::Polygon(parts.remove(0)),
+        _ => Shape::MultiPolygon(parts),
     }
 }
 

@@ -218,7 +218,7 @@ fn every_damage_is_found_and_repaired() {
     bytes[100] ^= 4;
     fs::write(shard, bytes).unwrap();
     let refused = set.finish(Check::Hashes).unwrap_err().to_string();
-    assert!(refused.contains("1 of 6 shards"), "{refused}");
+    assert!(refused.contains("damaged shards: 1 of 6"), "{refused}");
     make(&folder.0, &engine, Task::ALL, Check::Hashes);
     assert_eq!(set.finish(Check::Sizes).unwrap(), root);
     assert!(set.is_finished().unwrap());

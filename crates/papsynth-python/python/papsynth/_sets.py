@@ -19,16 +19,20 @@ def place(out: str | os.PathLike[str]) -> str:
     return out if "://" in out else os.path.abspath(out)
 
 
-def _list(formats: str | Sequence[str] | None) -> list[str] | None:
-    return [formats] if isinstance(formats, str) else None if formats is None else list(formats)
+def _list(names: str | Sequence[str] | None) -> list[str] | None:
+    return [names] if isinstance(names, str) else None if names is None else list(names)
+
+
+_OPTIONS = ("formats", "frames_per_shard", "without", "scenes", "threads", "verify", "model")
 
 
 def shard_count(recipe: Any, frames: int, options: dict[str, Any]) -> int:
     """Return the number of shards. Raises errors of recipe and options before a cluster starts."""
-    if unknown := set(options) - {"formats", "frames_per_shard", "threads", "verify", "model"}:
-        raise TypeError(f"{', '.join(sorted(unknown))}: unknown option; expected formats, frames_per_shard, threads, verify or model")
+    if unknown := set(options) - set(_OPTIONS):
+        raise TypeError(f"{', '.join(sorted(unknown))}: unknown option; expected {', '.join(_OPTIONS[:-1])} or {_OPTIONS[-1]}")
     engine(recipe, options.get("model"))
-    return _native.shards(frames, _list(options.get("formats")), options.get("frames_per_shard"))
+    formats, without = _list(options.get("formats")), _list(options.get("without"))
+    return _native.shards(frames, formats, options.get("frames_per_shard"), without)
 
 
 def task_count(shards: int, frames: int, workers: int, tasks: int | None) -> int:
@@ -78,6 +82,7 @@ def generate(
     task: tuple[int, int] = (0, 1),
     formats: str | Sequence[str] | None = None,
     frames_per_shard: int | None = None,
+    without: str | Sequence[str] | None = None,
     scenes: bool = False,
     threads: int = 1,
     verify: bool = False,
@@ -105,6 +110,9 @@ def generate(
         For example ``"webdataset"``. Default: ``"folder"``.
     frames_per_shard : int, optional
         Number of frames per shard.
+    without : str or list of str, optional
+        Files to leave out, as for `--without`: ``"noise-free"``, ``"layers"``, ``"labels"``, ``"preview"``,
+        ``"contact-sheet"``.
     scenes : bool
         Also write the scene of each frame to ``scenes/NNNNNN.json``, which `papsynth.render` reads.
     threads : int
@@ -128,7 +136,7 @@ def generate(
     OSError
         If a file cannot be written. Written files are complete, and the same call continues.
     ValueError
-        If the folder contains something else.
+        If an option is invalid, or the folder contains something else.
     """
     return _native.generate(
         engine(recipe, model),
@@ -138,6 +146,7 @@ def generate(
         task=tuple(task),
         formats=_list(formats),
         frames_per_shard=frames_per_shard,
+        without=_list(without),
         scenes=scenes,
         threads=threads,
         verify=verify,

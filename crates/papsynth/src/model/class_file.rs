@@ -19,7 +19,10 @@ impl Model {
     #[must_use]
     pub fn builtin() -> Self {
         let learned = Self::from_json(BUILTIN).expect("the built-in model is valid");
-        BUILTIN_CLASSES.iter().fold(learned, |model, text| model.with(text).expect("the built-in classes are valid"))
+        // `Engine::new` checks the values.
+        BUILTIN_CLASSES
+            .iter()
+            .fold(learned, |model, text| merged(&model, text).expect("the built-in classes are valid"))
     }
 
     /// Returns this model with the classes of `text` added; classes with the same name are replaced.
@@ -132,6 +135,11 @@ mod tests {
 
     fn with(text: &str) -> Result<Model, String> {
         Model::builtin().with(text).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn the_builtin_model_is_valid() {
+        Model::builtin().check().unwrap();
     }
 
     #[test]

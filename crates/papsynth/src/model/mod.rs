@@ -244,11 +244,16 @@ impl Model {
             version: u32,
         }
         let read = || {
-            let found = serde_json::from_str::<Version>(text).map_err(ErrorKind::NotAModel)?.version;
+            let model = serde_json::from_str::<Self>(text).map_err(ErrorKind::from);
+            // A wrong version explains other errors.
+            let found = match &model {
+                Ok(model) => model.version,
+                Err(_) => serde_json::from_str::<Version>(text).map_err(ErrorKind::NotAModel)?.version,
+            };
             if found != MODEL_VERSION {
                 return Err(ErrorKind::ModelVersion(found.to_string(), MODEL_VERSION));
             }
-            let model: Self = serde_json::from_str(text)?;
+            let model = model?;
             model.checked().map(|()| model)
         };
         read().map_err(Error::Model)
