@@ -489,7 +489,7 @@ mod tests {
             Run { y: 5, x0: 4, x1: 5 },
         ];
         let cut = Cut { first: [2, 2], whole: 9, size: [4, 3] };
-        let mut image = vec![0; 3 * 10];
+        let mut image = [0; 3 * 10];
         cut.for_each_run(&Mask::from_runs(runs.clone()), 10, |run| image[run].iter_mut().for_each(|pixel| *pixel += 1));
         let is_in = |x: usize, y: usize| {
             runs.iter().any(|run| run.y as usize == y && (run.x0 as usize..run.x1 as usize).contains(&x))
