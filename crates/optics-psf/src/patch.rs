@@ -117,12 +117,11 @@ enum Correction {
     Products,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct PaddedSpectra {
     margin_px: usize,
     /// Weight of the variance that was added to the absorbed light.
     added: f32,
-    canvas: Arc<Canvas>,
     spectra: Spectra,
 }
 
@@ -323,7 +322,7 @@ impl PatchImager {
             let columns = layer.width / layer.samples_per_pixel + 2 * margin_px;
             let rows = layer.absorbed.len() / layer.width / layer.samples_per_pixel + 2 * margin_px;
             let has_phase = !layer.phase.is_empty();
-            let PaddedSpectra { canvas, spectra, .. } = self.padded_spectra(layer, focus, corrected, scratch);
+            let (canvas, spectra) = self.padded_spectra(layer, focus, corrected, scratch);
             let absorbed = &mut factor.values[y * width..(y + rows) * width];
             let phases = if has_phase { &mut phases[y * width..(y + rows) * width] } else { &mut [] };
             canvas.expose(
@@ -337,47 +336,39 @@ impl PatchImager {
         factor.clipped = transmit(&mut factor.values, phases);
     }
 
-    /// Returns the layer's spectra with the margin of a focus, and computes missing ones.
+    /// Returns the layer's canvas and spectra with the margin of a focus, and computes what is missing.
     fn padded_spectra<'a>(
         &self,
         layer: &'a mut LoadedLayer,
         focus: &Focus,
         corrected: &mut Vec<f32>,
         scratch: &mut CanvasScratch,
-    ) -> &'a mut PaddedSpectra {
+    ) -> (Arc<Canvas>, &'a Spectra) {
         let LoadedLayer { absorbed, behind, phase, width, samples_per_pixel, padded, fresh, .. } = layer;
         let (width, n) = (*width, *samples_per_pixel);
-        let added = if layer.correction == Correction::Added { focus.filter.correction } else { 0.0 };
-        let is_same = |entry: &PaddedSpectra| entry.margin_px == focus.margin_px && entry.added == added;
-        let cached = padded[..*fresh].iter().position(is_same);
+        let canvas = self.canvas([width / n, absorbed.len() / width / n], n, focus.margin_px);
         let mut samples = Samples { absorbed, behind, phase, width, offset: focus.margin_px * n };
-        if cached.is_none() && added > 0.0 {
-            corrected.clone_from(absorbed);
-            add_scaled(corrected, &layer.variance, added);
-            samples.absorbed = corrected;
+        let cached = padded[..*fresh].iter().position(|entry| entry.margin_px == focus.margin_px);
+        let index = cached.unwrap_or(*fresh);
+        if index == padded.len() {
+            padded.push(PaddedSpectra::default());
         }
-        let index = cached.unwrap_or_else(|| {
-            let canvas = self.canvas([width / n, absorbed.len() / width / n], n, focus.margin_px);
-            if padded.len() == *fresh {
-                padded.push(PaddedSpectra {
-                    margin_px: 0,
-                    added,
-                    canvas: Arc::clone(&canvas),
-                    spectra: Spectra::default(),
-                });
-            }
-            let entry = &mut padded[*fresh];
-            (entry.margin_px, entry.added) = (focus.margin_px, added);
-            entry.canvas = canvas;
-            *fresh += 1;
-            entry.canvas.load(samples, &mut entry.spectra, scratch);
-            *fresh - 1
-        });
         let entry = &mut padded[index];
-        if focus.filter.is_corrected() && layer.correction == Correction::Products {
-            entry.canvas.correct(&self.in_focus, samples, &mut entry.spectra, scratch);
+        let added = if layer.correction == Correction::Added { focus.filter.correction } else { 0.0 };
+        if cached.is_none() || entry.added != added {
+            if added > 0.0 {
+                corrected.clone_from(absorbed);
+                add_scaled(corrected, &layer.variance, added);
+                samples.absorbed = corrected;
+            }
+            canvas.load(samples, &mut entry.spectra, scratch);
+            (entry.margin_px, entry.added) = (focus.margin_px, added);
+            *fresh = (*fresh).max(index + 1);
         }
-        entry
+        if focus.filter.is_corrected() && layer.correction == Correction::Products {
+            canvas.correct(&self.in_focus, samples, &mut entry.spectra, scratch);
+        }
+        (canvas, &entry.spectra)
     }
 
     /// Returns the canvas for a size in pixels with its margin.

@@ -280,7 +280,9 @@ fn layers_of_an_object_match_one_layer() {
     ];
     let (mut patch, mut scratch) = (Patch::default(), PatchScratch::default());
     let (mut whole, mut layered) = (Factor::default(), Factor::default());
-    for depth in [0.0, 0.7, -1.6, 3.0, 8.0] {
+    let depths = [0.0, 0.7, 1.3, -1.6, 3.0, 8.0];
+    let mut all = Vec::new();
+    for depth in depths {
         let focus = imager.focus(depth, 0.0).unwrap();
         imager.load(&fine, &[], 128, &mut patch);
         imager.expose(&mut patch, &focus, &mut scratch, &mut whole);
@@ -289,6 +291,42 @@ fn layers_of_an_object_match_one_layer() {
         assert_eq!(layered.width, whole.width);
         let error = relative(&double(&layered.values), &double(&whole.values));
         assert!(error < 2e-3, "{depth}: {error}");
+        all.push(layered.clone());
+    }
+    // A loaded patch gives the same factors in any order.
+    for (depth, expected) in depths.iter().zip(&all).rev().chain(depths.iter().zip(&all)) {
+        imager.expose(&mut patch, &imager.focus(*depth, 0.0).unwrap(), &mut scratch, &mut layered);
+        assert!(layered == *expected, "{depth}");
+    }
+}
+
+#[test]
+fn a_smooth_layer_with_a_steep_fold_matches_a_fine_layer() {
+    // A ridge of 0.5 µm, the width of a fold, on a disc: 1 or 2 samples per pixel.
+    let imager = imager(&MicroscopeParams { condenser_na: 0.6, ..MicroscopeParams::default() });
+    let absorbance = |x: f64, y: f64| {
+        let disc = 0.1 / (1.0 + libm::exp((libm::hypot(x - 64.0, y - 64.0) - 40.0) / 4.0));
+        let across = (0.8 * (x - 60.0) - 0.6 * (y - 66.0)) / 4.0;
+        disc * (1.0 + 5.0 * libm::exp(-across * across))
+    };
+    let light = |x: f64, y: f64| libm::exp10(-absorbance(x, y));
+    let fine: Vec<f32> = (0..128 * 128).map(|i| light(f64::from(i % 128), f64::from(i / 128)) as f32).collect();
+    let mean = |i: i32| {
+        let (x, y) = (f64::from(2 * (i % 64)), f64::from(2 * (i / 64)));
+        ((light(x, y) + light(x + 1.0, y) + light(x, y + 1.0) + light(x + 1.0, y + 1.0)) / 4.0) as f32
+    };
+    let coarse: Vec<f32> = (0..64 * 64).map(mean).collect();
+    let layer = PatchLayer { transmittance: &coarse, width: 64, samples_per_pixel: 1, ..PatchLayer::default() };
+    let (mut patch, mut scratch) = (Patch::default(), PatchScratch::default());
+    let (mut expected, mut found) = (Factor::default(), Factor::default());
+    for depth in [0.0, -0.7, 1.5, 4.0] {
+        let focus = imager.focus(depth, 0.0).unwrap();
+        imager.load(&fine, &[], 128, &mut patch);
+        imager.expose(&mut patch, &focus, &mut scratch, &mut expected);
+        imager.load_layers([64, 64], &[layer], &mut patch);
+        imager.expose(&mut patch, &focus, &mut scratch, &mut found);
+        let worst = found.values.iter().zip(&expected.values).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(worst < 8e-3, "{depth}: {worst}");
     }
 }
 
