@@ -4,6 +4,7 @@ use std::borrow::Cow;
 
 use multiversion::multiversion;
 
+use super::box_sums::add_row;
 use super::tile::{Point, Tile};
 
 impl Tile {
@@ -18,7 +19,7 @@ impl Tile {
     pub(crate) fn add_covers(&mut self, polygons: impl IntoIterator<Item = Vec<Point>>, weight: f32) {
         let mut edges = Edges::new(self);
         polygons.into_iter().for_each(|polygon| edges.add(&polygon));
-        edges.for_each_row(self, |row, coverage| add(row, coverage, weight));
+        edges.for_each_row(self, |row, coverage| add_row(row, coverage, weight));
     }
 }
 
@@ -27,13 +28,6 @@ fn raise(row: &mut [f32], coverage: &[f32]) {
     for (value, &coverage) in row.iter_mut().zip(coverage) {
         let coverage = if coverage < 1.0 { coverage } else { 1.0 };
         *value = if coverage > *value { coverage } else { *value };
-    }
-}
-
-#[multiversion(targets = "simd")]
-fn add(row: &mut [f32], coverage: &[f32], weight: f32) {
-    for (value, coverage) in row.iter_mut().zip(coverage) {
-        *value += weight * coverage;
     }
 }
 
@@ -250,6 +244,7 @@ mod tests {
             });
         }
     }
+
     #[test]
     fn coverage_matches_many_points_in_each_pixel() {
         // A star with long and short edges in all directions, partly outside the tile.
