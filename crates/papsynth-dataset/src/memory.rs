@@ -56,6 +56,16 @@ impl MemoryEstimate {
     /// constants.
     #[must_use]
     pub fn of(recipe: &Recipe, layout: &Layout) -> Self {
+        Self::largest(recipe, |recipe| Self::without_conditions(recipe, layout))
+    }
+
+    /// Returns the largest estimate over the conditions of slides.
+    fn largest(recipe: &Recipe, of: impl Fn(&Recipe) -> Self) -> Self {
+        let largest = |a: Self, b: Self| if b.frame > a.frame { b } else { a };
+        recipe.each_condition().map(|recipe| of(&recipe)).reduce(largest).unwrap_or_else(|| of(recipe))
+    }
+
+    fn without_conditions(recipe: &Recipe, layout: &Layout) -> Self {
         let most = |number: &Number| number.bounds()[1];
         let field = &recipe.field;
         let pixels = most(&field.width_px) * most(&field.height_px);
@@ -119,6 +129,11 @@ impl MemoryEstimate {
     #[cfg(feature = "zarr")]
     #[must_use]
     pub fn of_slide(recipe: &Recipe, shard_px: u32) -> Self {
+        Self::largest(recipe, |recipe| Self::of_slide_without_conditions(recipe, shard_px))
+    }
+
+    #[cfg(feature = "zarr")]
+    fn of_slide_without_conditions(recipe: &Recipe, shard_px: u32) -> Self {
         let most = |number: &Number| number.bounds()[1];
         // With the border that is simulated and cropped.
         let side = f64::from(recipe.scan.frame_px) + BORDER_PX;
@@ -128,7 +143,7 @@ impl MemoryEstimate {
         for mix in frame.cells.values_mut().filter(|mix| !mix.count.is_density()) {
             mix.count = (most(mix.count.number()) * grown).into();
         }
-        let of_frame = Self::of(&frame, &Layout::default());
+        let of_frame = Self::without_conditions(&frame, &Layout::default());
         let channels = if matches!(recipe.light, LightSection::Monochrome(_)) { 1.0 } else { 3.0 };
         // Grey levels, three labels and layers of each pixel, and a copy while they are packed.
         let a_pixel = 2.0 * channels * most(&recipe.focus.planes) + 14.0;

@@ -79,6 +79,7 @@ pub(crate) fn scene(index: u64, planes: usize, bits: u32) -> Scene {
     Scene {
         key: Key { seed: SEED, index },
         slide: index / 16,
+        condition: None,
         fusion: None,
         view: View { width: WIDTH, height: HEIGHT, pixel_um: 0.25 },
         planes_um: (0..planes).map(|z| 0.8 * z as f64 - 0.8).collect(),

@@ -380,6 +380,19 @@ class Cocci(Section):
 
 
 @dataclass(kw_only=True, slots=True)
+class Condition(Section):
+    """Conditions of some slides: values of numbers of the recipe."""
+
+    weight: float | None = None
+    """Weight: the fraction of slides with these conditions is the weight over the sum of all weights. From 0 to 1000000."""
+
+    numbers: dict[str, Abundance] | None = None
+    """Values by the path of the number, as in `"stain.field_nucleus" = 1.2`. They replace those of the recipe, and may be
+    distributions.
+    """
+
+
+@dataclass(kw_only=True, slots=True)
 class Crystals(Section):
     """Precipitated dye: dark, angular, refracting grains."""
 
@@ -1443,6 +1456,11 @@ class Recipe(Section):
     scan: Scan | None = None
     """Whole slides."""
 
+    conditions: list[Condition] | None = None
+    """Conditions of slides: numbers that differ together between slides, such as stain and light. One entry is drawn for
+    each slide (`slide.fields_per_slide`). Without entries, all slides have the numbers of the recipe.
+    """
+
 
 Acceptance = Union[Literal['near'], Literal['threshold']]
 """Selection of the patches of the donors (paper, section "Texture synthesis")."""
@@ -1537,6 +1555,7 @@ __all__ = [
     "Chromatin",
     "ClueCells",
     "Cocci",
+    "Condition",
     "Crystals",
     "Cytoplasm",
     "Debris",

@@ -8,6 +8,7 @@ use serde::de::{self, Deserializer, MapAccess, Visitor};
 use serde::ser::{SerializeMap, Serializer};
 use serde::{Deserialize, Serialize};
 
+use super::conditions::NumberMut;
 use super::number::{Entries, Number};
 use super::section::{Bounds, Declared, Part, Value};
 
@@ -115,6 +116,10 @@ impl Part for Abundance {
             Self::PerMm2(number) => Value::Density(number),
         };
         found.extend(bounds.map(|bounds| Declared { path: path.to_owned(), value, bounds }));
+    }
+
+    fn number_mut(&mut self, path: &str) -> Option<NumberMut<'_>> {
+        path.is_empty().then_some(NumberMut::Abundance(self))
     }
 }
 

@@ -30,7 +30,11 @@ impl Recipe {
         optics(self, &mut check);
         detector(&self.camera, &mut check);
         specimen(self, &mut check);
-        check.problems
+        let mut problems = check.problems;
+        if !self.conditions.is_empty() {
+            problems.extend(self.problems_of_conditions());
+        }
+        problems
     }
 
     /// Returns fields that are valid and unusual, such as a condenser aperture above that of the objective.

@@ -7,6 +7,7 @@
 pub(crate) mod abundance;
 pub(crate) mod camera;
 mod check;
+pub(crate) mod conditions;
 pub mod diagnose;
 pub(crate) mod dyes;
 pub(crate) mod imaging;
@@ -28,6 +29,7 @@ pub use crate::debris::{
 pub use crate::error::InvalidField;
 pub use abundance::Abundance;
 pub use camera::{Binning, CameraPreset, CameraSection, PhotonNoise, Subsampling};
+pub use conditions::{Condition, Conditions, Numbers};
 pub use dyes::DyeAmounts;
 pub use imaging::{
     Background, Border, Colour, Field, Focus, FocusOutput, Gaussians, Illumination, Imaging, LightSection, Microscope,

@@ -10,6 +10,17 @@ use super::whole::Recipe;
 
 const COMMENT_WIDTH: usize = 110;
 
+/// The end of a commented recipe without conditions.
+const CONDITIONS: &str = r#"
+# Conditions of slides: numbers that differ together between slides. One entry is drawn for each slide, with the
+# probability of its weight. Example:
+# [[conditions]]
+# weight = 1.0
+# [conditions.numbers]
+# "stain.field_nucleus" = 1.2
+# "background.level" = { normal = [0.85, 0.01] }
+"#;
+
 impl Recipe {
     /// Returns the recipe as TOML, with the documentation of each field as a comment.
     ///
@@ -25,6 +36,9 @@ impl Recipe {
              # Counts are per field, or per mm² if written as { per_mm2 = 180 } or { per_mm2 = { uniform = [90, 270] } }.\n\n",
         );
         table(&mut out, "", &value, Schema::new().root());
+        if self.conditions.is_empty() {
+            out.push_str(CONDITIONS);
+        }
         out
     }
 
@@ -42,7 +56,9 @@ impl Recipe {
 fn table(out: &mut String, path: &str, value: &Value, section: Section<'_>) {
     let Some(fields) = value.as_object() else { return };
     let kind = fields.get("kind").and_then(Value::as_str);
-    let (tables, plain): (Vec<_>, Vec<_>) = fields.iter().partition(|(_, value)| is_toml_table(value));
+    let is_list = |value: &Value| value.as_array().is_some_and(|items| items.iter().any(Value::is_object));
+    let (tables, plain): (Vec<_>, Vec<_>) =
+        fields.iter().partition(|(_, value)| is_toml_table(value) || is_list(value));
     for (name, value) in plain {
         match (name.as_str(), section.field(name, kind)) {
             ("kind", _) => choices(out, section),
@@ -57,6 +73,15 @@ fn table(out: &mut String, path: &str, value: &Value, section: Section<'_>) {
     for (name, value) in tables {
         let Some(field) = section.field(name, kind) else { continue };
         let inner = if path.is_empty() { key(name) } else { format!("{path}.{}", key(name)) };
+        if let (Some(items), Some(field)) = (value.as_array(), field.items()) {
+            out.push('\n');
+            comment(out, field.meaning().unwrap_or_default());
+            for item in items {
+                out.push_str(&format!("[[{inner}]]\n"));
+                table(out, &inner, item, field);
+            }
+            continue;
+        }
         out.push('\n');
         comment(out, field.meaning().unwrap_or_default());
         out.push_str(&format!("[{inner}]\n"));

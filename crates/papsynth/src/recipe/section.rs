@@ -6,6 +6,7 @@
 
 use std::borrow::Cow;
 
+use super::conditions::NumberMut;
 use super::number::Number;
 
 /// The range of a number.
@@ -57,24 +58,33 @@ impl Declared<'_> {
 pub(crate) trait Part {
     /// Appends the numbers of the part at `path`. `bounds` are those of the field, if it is a number.
     fn list<'a>(&'a self, _path: &str, _bounds: Option<Bounds>, _found: &mut Vec<Declared<'a>>) {}
+
+    /// Returns the number at a dotted path inside the part, if it may be a distribution.
+    fn number_mut(&mut self, _path: &str) -> Option<NumberMut<'_>> {
+        None
+    }
 }
 
 macro_rules! numbers {
-    ($($Type:ty: $number:ident => $value:expr,)*) => {
+    ($($Type:ty: $number:ident => $value:expr $(, as $Variant:ident)?;)*) => {
         $(impl Part for $Type {
             fn list<'a>(&'a self, path: &str, bounds: Option<Bounds>, found: &mut Vec<Declared<'a>>) {
                 let $number = self;
                 found.extend(bounds.map(|bounds| Declared { path: path.to_owned(), value: $value, bounds }));
             }
+
+            $(fn number_mut(&mut self, path: &str) -> Option<NumberMut<'_>> {
+                path.is_empty().then_some(NumberMut::$Variant(self))
+            })?
         })*
     };
 }
 numbers! {
-    Number: number => Value::Real(Cow::Borrowed(number)),
-    f64: number => Value::Real(Cow::Owned(Number::Fixed(*number))),
-    u32: number => Value::Whole((*number).into()),
-    u64: number => Value::Whole(*number),
-    usize: number => Value::Whole(*number as u64),
+    Number: number => Value::Real(Cow::Borrowed(number)), as Real;
+    f64: number => Value::Real(Cow::Owned(Number::Fixed(*number)));
+    u32: number => Value::Whole((*number).into());
+    u64: number => Value::Whole(*number);
+    usize: number => Value::Whole(*number as u64);
 }
 
 impl Part for String {}
@@ -132,6 +142,14 @@ macro_rules! section {
                     self.$field.list(&path_of_field, section!(@bounds $Kind $($($low $high)?)?), found);
                 )*
             }
+
+            fn number_mut(&mut self, path: &str) -> Option<$crate::recipe::conditions::NumberMut<'_>> {
+                let (field, inner) = path.split_once('.').unwrap_or((path, ""));
+                match field {
+                    $(stringify!($field) => self.$field.number_mut(inner),)*
+                    _ => None,
+                }
+            }
         }
 
         section!(@drawn $Name ($(($($source)?) $visible $Drawn)?) [] [] $({
@@ -171,6 +189,12 @@ macro_rules! section {
             ) {
                 match self {
                     $(Self::$Variant(section) => section.list(path, bounds, found),)*
+                }
+            }
+
+            fn number_mut(&mut self, path: &str) -> Option<$crate::recipe::conditions::NumberMut<'_>> {
+                match self {
+                    $(Self::$Variant(section) => section.number_mut(path),)*
                 }
             }
         }

@@ -7,6 +7,7 @@ use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::abundance::Abundance;
+use super::conditions::NumberMut;
 use super::dyes::DyeAmounts;
 use super::number::{Count, Number};
 use super::section::{Bounds, Declared, Part, section, within};
@@ -105,6 +106,15 @@ impl Part for Layout {
             Self::Labels(labels) => labels.list(path, bounds, found),
         }
     }
+
+    fn number_mut(&mut self, path: &str) -> Option<NumberMut<'_>> {
+        match self {
+            Self::Uniform {} | Self::DensityMap { .. } => None,
+            Self::Clusters(clusters) => clusters.number_mut(path),
+            Self::Band(band) => band.number_mut(path),
+            Self::Labels(labels) => labels.number_mut(path),
+        }
+    }
 }
 
 /// Cells of a recipe, by the name of their class in the model.
@@ -115,6 +125,11 @@ impl Part for Cells {
         for (class, mix) in self {
             mix.list(&within(path, class), bounds, found);
         }
+    }
+
+    fn number_mut(&mut self, path: &str) -> Option<NumberMut<'_>> {
+        // The name of a class may contain dots.
+        self.iter_mut().find_map(|(class, mix)| mix.number_mut(path.strip_prefix(class)?.strip_prefix('.')?))
     }
 }
 

@@ -1,6 +1,7 @@
 //! The recipe and its sections.
 
 use super::camera::CameraSection;
+use super::conditions::Conditions;
 use super::imaging::{Background, Field, Focus, LightSection, Optics};
 use super::number::Number;
 use super::scan::Scan;
@@ -45,6 +46,10 @@ section! {
         camera: CameraSection;
         /// Whole slides.
         scan: Scan;
+        /// Conditions of slides: numbers that differ together between slides, such as stain and light. One entry is
+        /// drawn for each slide (`slide.fields_per_slide`). Without entries, all slides have the numbers of the recipe.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        conditions: Conditions = Vec::new();
     }
 }
 
@@ -92,9 +97,26 @@ impl Recipe {
     #[must_use]
     pub fn expected_counts(&self) -> Vec<(String, f64)> {
         let area_mm2 = self.field_mm2();
-        let cells = self.cells.iter().map(|(class, mix)| (format!("cells.{class}.count"), &mix.count));
-        let debris = self.debris.abundances().into_iter().map(|(path, abundance)| (path.to_owned(), abundance));
-        cells.chain(debris).map(|(path, abundance)| (path, abundance.mean(area_mm2))).collect()
+        let counts = |recipe: &Self| -> Vec<(String, f64)> {
+            let cells = recipe.cells.iter().map(|(class, mix)| (format!("cells.{class}.count"), &mix.count));
+            let debris = recipe.debris.abundances().into_iter().map(|(path, abundance)| (path.to_owned(), abundance));
+            cells.chain(debris).map(|(path, abundance)| (path, abundance.mean(area_mm2))).collect()
+        };
+        let sum: f64 = self.conditions.iter().map(|condition| condition.weight).sum();
+        if sum <= 0.0 {
+            return counts(self);
+        }
+        let mut means: Vec<(String, f64)> = Vec::new();
+        for (index, condition) in self.conditions.iter().enumerate() {
+            let part = condition.weight / sum;
+            for (at, (path, mean)) in counts(&self.with_condition(index)).into_iter().enumerate() {
+                match means.get_mut(at) {
+                    Some((_, sum)) => *sum += part * mean,
+                    None => means.push((path, part * mean)),
+                }
+            }
+        }
+        means
     }
 
     /// Reads a recipe from TOML. Ranges are not checked: see [`Recipe::problems`].
@@ -116,7 +138,7 @@ impl Recipe {
         }
         take!(
             field, focus, slide, layout, cells, cytoplasm, nucleus, stain, debris, background, light, optics, camera,
-            scan
+            scan, conditions
         );
     }
 

@@ -29,6 +29,9 @@ pub const MAX_ATTEMPTS: u32 = 8;
 /// # Errors
 /// If no draw can succeed: the weight map is missing or too uneven, or there are more objects than labels can number.
 pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key: Key) -> Result<Scene, Error> {
+    let slide = slide_of(recipe, key);
+    let condition = recipe.condition_of_slide(key.seed, slide);
+    let recipe = &*recipe.of_slide(key.seed, slide);
     let field = FieldNumbers { key };
     let view = View {
         width: field.count(named!(recipe.field.width_px)),
@@ -36,7 +39,7 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
         pixel_um: pixel_um(recipe, &field),
     };
     let fail = |cause| Error::Image { index: key.index, cause };
-    let stain = FieldStain::draw(&recipe.stain, &field, slide_of(recipe, key));
+    let stain = FieldStain::draw(&recipe.stain, &field, slide);
     let draw_cells = |attempt: u32, crowding: Crowding| {
         let numbers = FieldNumbers { key: key.attempt(attempt) };
         let cells = draw_cells(recipe, model, weight_map, view, &numbers, &stain, crowding)?;
@@ -71,8 +74,7 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
     for (id, object) in (1_u32..).zip(&mut objects) {
         object.id = id;
     }
-    let slide = slide_of(recipe, key);
-    Ok(Scene { objects, slide, attempts: attempt + 1, cells: counts, ..empty(recipe, view, &field, &stain) })
+    Ok(Scene { objects, slide, condition, attempts: attempt + 1, cells: counts, ..empty(recipe, view, &field, &stain) })
 }
 
 /// Adds debris to the objects in the field and its margin, and draws the bacteria on clue cells. On a slide,
@@ -123,6 +125,7 @@ pub(super) fn empty(recipe: &Recipe, view: View, field: &FieldNumbers, stain: &F
     Scene {
         key: field.key,
         slide: 0,
+        condition: None,
         view,
         planes_um,
         fusion,

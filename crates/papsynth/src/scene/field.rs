@@ -18,6 +18,9 @@ pub struct Scene {
     pub key: Key,
     /// Number of the slide of the field.
     pub slide: u64,
+    /// Index of the entry of `conditions` in the recipe, if it has any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<usize>,
     /// The image and its pixels.
     pub view: View,
     /// Position of the stage at each focal plane, µm, in the order of the stack. Larger values focus nearer to the

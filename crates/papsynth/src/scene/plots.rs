@@ -106,11 +106,13 @@ impl PlotCache {
 impl Population {
     /// Returns the population of the slide with this key, and the scene of the empty slide.
     pub(crate) fn new(recipe: &Recipe, model: &Model, key: Key) -> Result<(Self, Scene), ErrorKind> {
+        let condition = recipe.condition_of_slide(key.seed, key.index);
+        let recipe = &*recipe.of_slide(key.seed, key.index);
         let slide = FieldNumbers { key };
         let stain = FieldStain::of_slide(&recipe.stain, &slide);
         let pixel_um = pixel_um(recipe, &slide);
         let view = View { width: 0, height: 0, pixel_um };
-        let scene = empty(recipe, view, &slide, &stain);
+        let scene = Scene { condition, ..empty(recipe, view, &slide, &stain) };
         let middle = |number: &Number| number.bounds().iter().sum::<f64>() / 2.0;
         let field_px = middle(&recipe.field.width_px) * middle(&recipe.field.height_px);
         let relief_key = key.stream("slide", 0, "slide.relief").next_u64();

@@ -70,10 +70,22 @@ pub fn find(text: &str, path: &[String]) -> Option<Range<usize>> {
     let document = DeTable::parse(text).ok()?;
     let mut table = document.get_ref();
     let mut found = None;
-    for name in path {
-        let Some((key, value)) = table.iter().find(|(key, _)| key.get_ref() == name) else { break };
-        let DeValue::Table(inner) = value.get_ref() else { return Some(value.span()) };
+    let mut names = path.iter();
+    while let Some(name) = names.next() {
+        let mut found_key = table.iter().find(|(key, _)| key.get_ref() == name);
+        if found_key.is_none() {
+            // A key may contain dots.
+            let rest = [std::slice::from_ref(name), names.as_slice()].concat().join(".");
+            found_key = table.iter().find(|(key, _)| *key.get_ref() == rest);
+        }
+        let Some((key, mut value)) = found_key else { break };
         found = Some(if is_inline(text, value) { value.span() } else { key.span() });
+        if let DeValue::Array(items) = value.get_ref() {
+            let item = names.next().and_then(|index| items.get(index.parse::<usize>().ok()?));
+            let Some(item) = item else { return Some(value.span()) };
+            (found, value) = (Some(item.span()), item);
+        }
+        let DeValue::Table(inner) = value.get_ref() else { return Some(value.span()) };
         table = inner;
     }
     found
@@ -105,6 +117,9 @@ fn version(table: &DeTable<'_>) -> Result<(), Vec<FieldError>> {
 /// Largest number of unknown keys with a suggestion.
 const MOST_HELPED: usize = 64;
 
+/// Length of the path of the numbers of a condition: `conditions`, its index, `numbers`.
+const CONDITION_NUMBERS: usize = 3;
+
 struct Check<'c> {
     schema: &'c Schema,
     text: &'c str,
@@ -135,7 +150,12 @@ impl Check<'_> {
                     }
                     // A suggestion takes a millisecond, too long for thousands of keys.
                     let is_helped = renamed.is_none() && self.errors.len() < MOST_HELPED;
-                    let help = is_helped.then(|| self.unknown_help(name, section.keys(kind.as_deref())));
+                    let help = is_helped.then(|| match path.split_at_checked(CONDITION_NUMBERS) {
+                        Some(([first, .., last], rest)) if first == "conditions" && last == "numbers" => {
+                            format!("write the path as one key in quotes: \"{}\"", rest.join("."))
+                        }
+                        _ => self.unknown_help(name, section.keys(kind.as_deref())),
+                    });
                     self.errors.push(FieldError { path: path.clone(), span: Some(key.span()), message, help });
                 }
                 Some(inner) => self.value(value, inner, path),
@@ -181,6 +201,14 @@ impl Check<'_> {
                 }
             }
             DeValue::Table(inner) if section.is_table() => self.table(inner, section, path),
+            DeValue::Array(items) => {
+                let Some(section) = section.items() else { return };
+                for (index, item) in items.iter().enumerate() {
+                    path.push(index.to_string());
+                    self.value(item, section, path);
+                    path.pop();
+                }
+            }
             DeValue::String(word) if !words.is_empty() && !words.contains(&word.as_ref()) => {
                 let message = unknown_value(path, word);
                 self.add(path, node.span(), &message, Some(choice_help(word, &words)));

@@ -111,6 +111,12 @@ impl<'s> Section<'s> {
         known.or_else(any).map(|named| Self { root: self.root, named })
     }
 
+    /// Returns the schema of the items of a list.
+    pub fn items(self) -> Option<Self> {
+        let named = self.alternatives().find_map(|a| a.named.get("items")).filter(|items| items.is_object())?;
+        Some(Self { root: self.root, named })
+    }
+
     /// Returns whether it is a table whose keys can be checked.
     pub fn is_table(self) -> bool {
         self.alternatives().any(|a| a.properties().is_some() || a.named.get("additionalProperties").is_some())
