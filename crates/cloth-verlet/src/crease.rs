@@ -119,10 +119,14 @@ impl Sheet {
         // For each triangle the new vertices on the side opposite each corner, in ascending order of `far`.
         const NONE: Range<u32> = 0..0;
         let mut made = vec![[NONE; 3]; self.triangles.len()];
+        let Some((&first_line, &last_line)) = lines.first().zip(lines.last()) else { return };
         let radius = Arc::make_mut(&mut self.radius);
         for edge in self.edges.iter() {
             let [i, j] = edge.ends.map(|v| v as usize);
             let [i, j] = if far[i] < far[j] { [i, j] } else { [j, i] };
+            if far[j] <= first_line || far[i] >= last_line {
+                continue;
+            }
             let crossed = lines.partition_point(|line| line - far[i] <= tolerance)
                 ..lines.partition_point(|line| far[j] - line > tolerance);
             if crossed.is_empty() {

@@ -5,6 +5,7 @@ mod batch;
 mod cloth;
 mod coarse;
 mod crease;
+mod delaunay;
 mod error;
 #[cfg(any(feature = "mint", feature = "nalgebra"))]
 mod interop;

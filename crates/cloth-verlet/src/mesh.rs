@@ -1,10 +1,11 @@
 //! The triangulated disc of all sheets. All sheets have the same topology, so that they can be solved in vector lanes.
 
+use crate::delaunay::{delaunay, triangulation};
 use crate::refine::{Stencils, index};
 use crate::sheet::{cross, edges};
 use crate::{Error, Point};
 use multiversion::multiversion;
-use spade::{DelaunayTriangulation, FloatTriangulation, Point2, Triangulation};
+use spade::{FloatTriangulation, Point2};
 use std::f64::consts::{PI, TAU};
 
 /// The paper's mesh: 75 vertices on the rim of 538.
@@ -16,6 +17,12 @@ const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 
 /// Vertices of a square patch of the mesh. Those of sixteen sheets, with their neighbours, fill half of an L1 cache.
 const PATCH: f64 = 100.0;
+
+/// Inner vertices whose harmonic weights are computed and summed together.
+const LANES: usize = 8;
+
+/// A number for each of [`LANES`] vertices.
+type Lanes = [f64; LANES];
 
 /// A pair of vertices with a distance constraint.
 pub(crate) type Pair = [u32; 2];
@@ -31,8 +38,8 @@ pub(crate) struct Disc {
     pub(crate) edges: Vec<Vec<Pair>>,
     /// The two vertices opposite each inner edge, in the same patches.
     pub(crate) bends: Vec<Vec<Pair>>,
-    /// `harmonics[k][v]` is the weight of rim vertex k in inner vertex v.
-    harmonics: Vec<Vec<f64>>,
+    /// Blocks of `rim` elements: the weights of each rim vertex in [`LANES`] inner vertices.
+    harmonics: Vec<Lanes>,
 }
 
 impl Disc {
@@ -52,11 +59,13 @@ impl Disc {
     /// Extends a closed curve of `rim` points to all vertices: each coordinate is the harmonic function with these
     /// values on the circle.
     pub(crate) fn harmonic_map(&self, curve: &[Point]) -> Vec<Point> {
-        let (mut xs, mut ys) = (vec![0.0; self.points.len() - self.rim], vec![0.0; self.points.len() - self.rim]);
-        for (weights, &[x, y]) in self.harmonics.iter().zip(curve) {
-            add_multiples(&mut xs, &mut ys, weights, [x, y]);
+        let mut points = curve.to_vec();
+        for weights in self.harmonics.chunks_exact(self.rim) {
+            let [xs, ys] = weighted_sums(weights, curve);
+            points.extend(xs.into_iter().zip(ys).map(|(x, y)| [x, y]));
         }
-        curve.iter().copied().chain(xs.into_iter().zip(ys).map(|(x, y)| [x, y])).collect()
+        points.truncate(self.points.len());
+        points
     }
 
     /// Returns the weights of linear interpolation from the vertices of this mesh to those of another: along the rim
@@ -77,12 +86,17 @@ impl Disc {
     }
 }
 
+/// Returns the sums of the points of a curve times their weights, in x and y.
 #[multiversion(targets = "simd")]
-fn add_multiples(xs: &mut [f64], ys: &mut [f64], weights: &[f64], [x, y]: Point) {
-    for ((sum_x, sum_y), w) in xs.iter_mut().zip(ys).zip(weights) {
-        *sum_x += w * x;
-        *sum_y += w * y;
+fn weighted_sums(weights: &[Lanes], curve: &[Point]) -> [Lanes; 2] {
+    let [mut xs, mut ys] = [[0.0; LANES]; 2];
+    for (weights, &[x, y]) in weights.iter().zip(curve) {
+        for l in 0..LANES {
+            xs[l] += weights[l] * x;
+            ys[l] += weights[l] * y;
+        }
     }
+    [xs, ys]
 }
 
 /// Returns the numbers of vertices on the rim and inside, in the proportion of the paper's mesh.
@@ -97,22 +111,6 @@ fn sunflower(rim: usize, inner: usize) -> Vec<Point> {
     let on_rim = (0..rim).map(|k| (1.0, TAU * k as f64 / rim as f64));
     let inside = (0..inner).map(|i| (reach * ((i as f64 + 0.5) / inner as f64).sqrt(), GOLDEN_ANGLE * i as f64));
     on_rim.chain(inside).map(|(r, angle)| [r * libm::cos(angle), r * libm::sin(angle)]).collect()
-}
-
-fn delaunay(points: &[Point]) -> Result<Vec<[u32; 3]>, Error> {
-    let corners = |mesh: DelaunayTriangulation<_>| {
-        mesh.inner_faces().map(|face| face.vertices().map(|v| index(v.fix().index()))).collect()
-    };
-    triangulation(points).map(corners)
-}
-
-fn triangulation(points: &[Point]) -> Result<DelaunayTriangulation<Point2<f64>>, Error> {
-    let vertices = points.iter().map(|p| Point2::new(p[0], p[1])).collect();
-    DelaunayTriangulation::bulk_load_stable(vertices).map_err(|_| Error::Parameter {
-        field: "vertices",
-        value: f64::NAN,
-        accepted: "a number of points that can be triangulated",
-    })
 }
 
 /// Moves each inner vertex to the centre of mass of the triangles around it.
@@ -184,28 +182,46 @@ fn independent_sets(pairs: &[Pair], vertices: usize) -> Vec<Pair> {
 }
 
 /// Returns the weights of the trigonometric polynomial through the rim, continued inwards:
-/// w = (1/K) ∑_l r^|l| cos l(θ - θ_k), |l| ≤ K/2.
-fn harmonics(points: &[Point], rim: usize) -> Vec<Vec<f64>> {
-    points[..rim]
-        .iter()
-        .map(|&[cos_k, sin_k]| {
-            let weight = |&[x, y]: &Point| {
-                // z = r e^{i(θ - θ_k)}; its powers are the terms of the sum.
-                let z = [x * cos_k + y * sin_k, y * cos_k - x * sin_k];
-                let mut power = z;
-                let mut sum = 1.0;
-                for _ in 1..rim.div_ceil(2) {
-                    sum += 2.0 * power[0];
-                    power = [power[0] * z[0] - power[1] * z[1], power[0] * z[1] + power[1] * z[0]];
-                }
-                if rim.is_multiple_of(2) {
-                    sum += power[0];
-                }
-                sum / rim as f64
-            };
-            points[rim..].iter().map(weight).collect()
-        })
-        .collect()
+/// w = (1/K) ∑_l r^|l| cos l(θ - θ_k), |l| ≤ K/2. The last block is filled up with points at the centre.
+fn harmonics(points: &[Point], rim: usize) -> Vec<Lanes> {
+    let (rim, inner) = points.split_at(rim);
+    let mut weights = Vec::with_capacity(rim.len() * inner.len().div_ceil(LANES));
+    for block in inner.chunks(LANES) {
+        let mut places = [[0.0; LANES]; 2];
+        for (l, point) in block.iter().enumerate() {
+            (places[0][l], places[1][l]) = (point[0], point[1]);
+        }
+        weights.extend(rim.iter().map(|&at| harmonics_of(places, at, rim.len())));
+    }
+    weights
+}
+
+/// Returns the weights of one of `count` rim vertices in inner vertices.
+#[multiversion(targets = "simd")]
+fn harmonics_of([xs, ys]: [Lanes; 2], [cos_k, sin_k]: Point, count: usize) -> Lanes {
+    // z = r e^{i(θ - θ_k)}; its powers are the terms of the sum.
+    let [mut re, mut im] = [[0.0; LANES]; 2];
+    for l in 0..LANES {
+        re[l] = xs[l] * cos_k + ys[l] * sin_k;
+        im[l] = ys[l] * cos_k - xs[l] * sin_k;
+    }
+    let [mut power_re, mut power_im] = [re, im];
+    let mut sums = [1.0; LANES];
+    for _ in 1..count.div_ceil(2) {
+        for l in 0..LANES {
+            sums[l] += 2.0 * power_re[l];
+            let next = power_re[l] * re[l] - power_im[l] * im[l];
+            power_im[l] = power_re[l] * im[l] + power_im[l] * re[l];
+            power_re[l] = next;
+        }
+    }
+    for l in 0..LANES {
+        if count.is_multiple_of(2) {
+            sums[l] += power_re[l];
+        }
+        sums[l] /= count as f64;
+    }
+    sums
 }
 
 #[cfg(test)]

@@ -61,12 +61,14 @@ impl Refinement {
     /// them. The rest state is only divided, so that its area does not change.
     pub(crate) fn snap_rim(&self, sheet: &mut Sheet, outline: &Outline, offset: f64) {
         let count = self.rim.len();
+        let corners = outline.corners(count, offset);
+        sheet.reserve(corners.len());
         let radius = Arc::make_mut(&mut sheet.radius);
         for (side, [x, y]) in self.rim.iter().zip(outline.resampled(count, offset)) {
             let v = side.start as usize;
             [sheet.vertices[v][0], sheet.vertices[v][1], radius[v]] = [x, y, 1.0];
         }
-        for corners in outline.corners(count, offset).chunk_by(|a, b| a.0 == b.0) {
+        for corners in corners.chunk_by(|a, b| a.0 == b.0) {
             self.fan(sheet, corners);
         }
     }

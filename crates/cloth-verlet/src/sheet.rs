@@ -45,6 +45,15 @@ impl Sheet {
         Sheet { vertices, rest, radius: Arc::new(radius), triangles: Arc::new(triangles), edges }
     }
 
+    /// Allocates memory for more vertices on the rim. Each has one more triangle and two more edges.
+    pub(crate) fn reserve(&mut self, vertices: usize) {
+        self.vertices.reserve_exact(vertices);
+        self.rest.reserve_exact(vertices);
+        self.radius = Arc::new(with_room(&self.radius, vertices));
+        self.triangles = Arc::new(with_room(&self.triangles, vertices));
+        self.edges = Arc::new(with_room(&self.edges, 2 * vertices));
+    }
+
     /// Recomputes the edges, after triangles have been divided.
     pub(crate) fn update_edges(&mut self) {
         self.edges = Arc::new(edges(&self.triangles, self.vertices.len()));
@@ -127,6 +136,13 @@ impl Sheet {
         }
         (sum / self.edges.len() as f64).sqrt()
     }
+}
+
+/// Returns a copy with room for more values.
+fn with_room<T: Copy>(values: &[T], more: usize) -> Vec<T> {
+    let mut copy = Vec::with_capacity(values.len() + more);
+    copy.extend_from_slice(values);
+    copy
 }
 
 /// Returns the rim from vertex 0 on: each vertex with the triangle at the boundary edge that starts there.
