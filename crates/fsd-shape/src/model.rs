@@ -50,8 +50,7 @@ impl ShapeModel {
     ///
     /// If the numbers are out of range or inconsistent.
     pub fn from_statistics(statistics: ShapeStatistics) -> Result<Self, Error> {
-        statistics.check()?;
-        let polynomials = statistics.components.iter().filter_map(|c| c.polynomial()).collect();
+        let polynomials = statistics.checked()?;
         let modulation = Modulation::new(&statistics);
         Ok(Self { statistics, polynomials, modulation })
     }

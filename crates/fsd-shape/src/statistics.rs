@@ -143,7 +143,8 @@ impl ShapeStatistics {
         powers
     }
 
-    pub(crate) fn check(&self) -> Result<(), Error> {
+    /// Checks the statistics and returns the polynomial of each component.
+    pub(crate) fn checked(&self) -> Result<Vec<FleishmanPolynomial>, Error> {
         if !(1..=MAX_HARMONICS).contains(&self.harmonics) {
             return wrong("harmonics", format!("= {}: expected 1 to {MAX_HARMONICS}", self.harmonics));
         }
@@ -153,20 +154,16 @@ impl ShapeStatistics {
         check_number("local_roughness", self.local_roughness, 0.0, 1.0)?;
         self.check_vector("mean", &self.mean, f64::MIN)?;
         self.check_vector("residual_sd", &self.residual_sd, 0.0)?;
-        for (k, component) in self.components.iter().enumerate() {
+        let polynomial = |(k, component): (usize, &PrincipalComponent)| {
             self.check_vector("components.loading", &component.loading, f64::MIN)?;
-            if component.polynomial().is_none() {
-                return wrong(
-                    "components",
-                    format!(
-                        "[{k}]: skewness {} and excess kurtosis {} are out of range: expected -2 to 2 and \
-                         1.7 skewness² - 1 to 12",
-                        component.skewness, component.excess_kurtosis
-                    ),
-                );
-            }
-        }
-        Ok(())
+            let PrincipalComponent { skewness, excess_kurtosis, .. } = component;
+            let accepted = "expected -2 to 2 and 1.7 skewness² - 1 to 12";
+            let problem = || {
+                format!("[{k}]: skewness {skewness} and excess kurtosis {excess_kurtosis} are out of range: {accepted}")
+            };
+            component.polynomial().map_or_else(|| wrong("components", problem()), Ok)
+        };
+        self.components.iter().enumerate().map(polynomial).collect()
     }
 
     fn check_vector(&self, field: &'static str, values: &[f64], least: f64) -> Result<(), Error> {
@@ -195,7 +192,7 @@ fn check_number(field: &'static str, value: f64, least: f64, most: f64) -> Resul
     wrong(field, format!("contains {value}: expected {accepted}"))
 }
 
-fn wrong(field: &'static str, problem: String) -> Result<(), Error> {
+fn wrong<T>(field: &'static str, problem: String) -> Result<T, Error> {
     Err(Error::Statistics { field, problem })
 }
 
