@@ -1,7 +1,7 @@
 //! Data shared by all images of one recipe: shape models, cloth mesh, donors, noise field plans.
 
 use std::collections::BTreeMap;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use cloth_verlet::{Cloth, ClothParams};
 use fsd_shape::{Descriptors, ShapeModel};
@@ -49,7 +49,7 @@ const TORUS_SITES: usize = 1200;
 pub(crate) struct ClassAssets {
     pub(crate) class: CellClass,
     cytoplasm: ShapeModel,
-    nucleus: ShapeModel,
+    nucleus: Arc<ShapeModel>,
     pub(crate) donors: DonorSet,
     pub(crate) quilt: QuiltParams,
 }
@@ -109,7 +109,7 @@ impl ClassAssets {
                 .map_err(|error| ErrorKind::Shapes(format!("classes.{name}"), error))
         };
         let cytoplasm = model(&class.cytoplasm.shapes, recipe.cytoplasm.shape)?;
-        let nucleus = model(&class.nucleus.shapes, recipe.nucleus.shape)?;
+        let nucleus = Arc::new(model(&class.nucleus.shapes, recipe.nucleus.shape)?);
         let donors = DonorSet::new(name, &class.nucleus, &nucleus)?;
         let quilt = quilt(recipe, class, donors.pixel_um);
         Ok(Self { class: class.clone(), cytoplasm, nucleus, donors, quilt })

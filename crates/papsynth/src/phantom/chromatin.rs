@@ -1,5 +1,7 @@
 //! The texture of nuclei: donors and their patches (paper, section "Texture synthesis", Figs. 4, 5).
 
+use std::sync::{Arc, OnceLock};
+
 use fsd_shape::ShapeModel;
 use multiversion::multiversion;
 use quilt_texture::{QuiltParams, Quilter, Source};
@@ -8,7 +10,7 @@ use spectral_field::{FieldParams, Padding, SpectralField, Spectrum};
 use super::tile::{Point, Tile};
 use crate::error::ErrorKind;
 use crate::key::{Key, Stream};
-use crate::model::{ChromatinStatistics, Donor, NucleusStatistics, OUTSIDE};
+use crate::model::{ChromatinStatistics, Donor, LogNormal, NucleusStatistics, OUTSIDE};
 use crate::random;
 
 /// Pixel size of synthetic donors, µm: the paper's.
@@ -23,7 +25,14 @@ const MEASURED_SIGMA_UM: f64 = 0.225;
 /// The donors of a class: textures with mean 0 and variance 1 inside their nuclei.
 #[derive(Debug)]
 pub(crate) struct DonorSet {
-    sources: Vec<Source>,
+    /// Synthetic donors are created on first use.
+    sources: Vec<OnceLock<Source>>,
+    /// Name of the class.
+    name: String,
+    /// Radius of the nuclei.
+    radius_um: LogNormal,
+    /// Outlines of the nuclei.
+    shapes: Arc<ShapeModel>,
     /// Pixel size, µm.
     pub(crate) pixel_um: f64,
     pub(crate) imaged: bool,
@@ -37,13 +46,13 @@ pub(crate) struct DonorSet {
 #[derive(Debug)]
 struct ChromatinField {
     field: SpectralField,
-    skewness: f64,
+    skew: Skew,
     profile: Vec<f64>,
 }
 
 impl DonorSet {
     /// Creates the donors of a class: learned ones if available, else synthetic ones.
-    pub(crate) fn new(name: &str, nucleus: &NucleusStatistics, shapes: &ShapeModel) -> Result<Self, ErrorKind> {
+    pub(crate) fn new(name: &str, nucleus: &NucleusStatistics, shapes: &Arc<ShapeModel>) -> Result<Self, ErrorKind> {
         let field = ChromatinField::new(&nucleus.chromatin)?;
         let imaged = !nucleus.donors.is_empty();
         let (sources, pixel_um) = match nucleus.donors.first() {
@@ -52,15 +61,41 @@ impl DonorSet {
                 if !same {
                     return Err(ErrorKind::DonorPixels(name.to_owned()));
                 }
-                (nucleus.donors.iter().map(learned_source).collect::<Result<Vec<_>, _>>()?, first.pixel_um)
+                let learned = nucleus.donors.iter().map(|donor| learned_source(donor).map(OnceLock::from));
+                (learned.collect::<Result<Vec<_>, _>>()?, first.pixel_um)
             }
-            None => {
-                let make = |index| field.donor(name, index, nucleus, shapes);
-                ((0..SYNTHETIC_DONORS as u64).map(make).collect::<Result<Vec<_>, _>>()?, SYNTHETIC_PIXEL_UM)
-            }
+            None => ((0..SYNTHETIC_DONORS).map(|_| OnceLock::new()).collect(), SYNTHETIC_PIXEL_UM),
         };
         let sharpening = if imaged { 1.0 } else { 1.0 / blur_attenuation(&nucleus.chromatin) };
-        Ok(Self { sources, pixel_um, imaged, sharpening, field })
+        let (name, radius_um, shapes) = (name.to_owned(), nucleus.radius_um, Arc::clone(shapes));
+        Ok(Self { sources, name, radius_um, shapes, pixel_um, imaged, sharpening, field })
+    }
+
+    /// Returns the source of a donor.
+    fn source(&self, index: usize) -> Result<&Source, ErrorKind> {
+        if let Some(source) = self.sources[index].get() {
+            return Ok(source);
+        }
+        // If several threads create the same donor, their results are equal.
+        let source = self.synthetic_source(index as u64)?;
+        Ok(self.sources[index].get_or_init(|| source))
+    }
+
+    /// Draws a synthetic donor: a nucleus shape of the class filled with its field.
+    fn synthetic_source(&self, index: u64) -> Result<Source, ErrorKind> {
+        // Donors are part of the model, so their key does not depend on the image.
+        let mut rng = Key { seed: 0, index: 0 }.stream(&format!("donor/{}", self.name), index, "made");
+        let radius =
+            self.radius_um.median * libm::exp(self.radius_um.log_sd * random::normal(&mut rng)) / SYNTHETIC_PIXEL_UM;
+        /// Minimum radius of a donor, px.
+        const MIN_RADIUS: f64 = 9.0;
+        let drawn = self.shapes.draw(radius.max(MIN_RADIUS), &mut rng)?;
+        let outline: Vec<Point> = drawn.descriptors.outline(64);
+        let mut coverage = Tile::around(&outline, 1.0);
+        coverage.cover(&outline);
+        let mut pixels = self.field.texture(&coverage.values, coverage.width, &mut rng);
+        standardise(&mut pixels, &coverage.values);
+        Ok(Source::new(&pixels, &coverage.values, coverage.width)?)
     }
 
     /// Synthesises a texture from patches of some of the donors, with mean 0 and variance 1 over the covered pixels.
@@ -72,9 +107,8 @@ impl DonorSet {
         params: &QuiltParams,
         rng: &mut Stream,
     ) -> Result<Vec<f32>, ErrorKind> {
-        let chosen: Vec<&Source> =
-            choose(self.sources.len(), donors, rng).into_iter().map(|i| &self.sources[i]).collect();
-        let quilter = Quilter::new(&chosen, params)?;
+        let chosen = choose(self.sources.len(), donors, rng).into_iter().map(|index| self.source(index));
+        let quilter = Quilter::new(&chosen.collect::<Result<Vec<_>, _>>()?, params)?;
         let grid = DonorGrid::new(coverage, pixel_um / self.pixel_um);
         Ok(grid.sample(&quilter.synthesise(&grid.mask, grid.width, rng).pixels, coverage))
     }
@@ -109,32 +143,9 @@ impl ChromatinField {
         let params = FieldParams { width: SIDE, height: SIDE, spectrum, padding: Padding::Periodic };
         Ok(Self {
             field: SpectralField::new(&params)?,
-            skewness: chromatin.skewness,
+            skew: Skew::new(chromatin.skewness),
             profile: chromatin.rim_to_centre.clone(),
         })
-    }
-
-    /// Draws a synthetic donor: a nucleus shape of the class filled with its field.
-    fn donor(
-        &self,
-        name: &str,
-        index: u64,
-        nucleus: &NucleusStatistics,
-        shapes: &ShapeModel,
-    ) -> Result<Source, ErrorKind> {
-        // Donors are part of the model, so their key does not depend on the image.
-        let mut rng = Key { seed: 0, index: 0 }.stream(&format!("donor/{name}"), index, "made");
-        let radius = nucleus.radius_um.median * libm::exp(nucleus.radius_um.log_sd * random::normal(&mut rng))
-            / SYNTHETIC_PIXEL_UM;
-        /// Minimum radius of a donor, px.
-        const MIN_RADIUS: f64 = 9.0;
-        let drawn = shapes.draw(radius.max(MIN_RADIUS), &mut rng)?;
-        let outline: Vec<Point> = drawn.descriptors.outline(64);
-        let mut coverage = Tile::around(&outline, 1.0);
-        coverage.cover(&outline);
-        let mut pixels = self.texture(&coverage.values, coverage.width, &mut rng);
-        standardise(&mut pixels, &coverage.values);
-        Ok(Source::new(&pixels, &coverage.values, coverage.width)?)
     }
 
     /// Draws a field with the skewness of the class and its profile from rim to centre.
@@ -144,26 +155,39 @@ impl ChromatinField {
         let side = self.field.width();
         let draw = self.field.draw(rng);
         let depth = depth_from_rim(mask, width);
-        (0..mask.len())
-            .map(|i| {
-                let (x, y) = (i % width, i / width);
-                let normal = f64::from(draw[(y % side) * side + x % side]);
-                let trend = MEAN_OVER_SD * (interpolate(&self.profile, depth[i]) - 1.0);
-                (trend + skewed(normal, self.skewness)) as f32
-            })
-            .collect()
+        let mut pixels = Vec::with_capacity(mask.len());
+        for (y, depth) in depth.chunks_exact(width).enumerate() {
+            let normals = draw[(y % side) * side..][..side].iter().cycle();
+            pixels.extend(depth.iter().zip(normals).map(|(&depth, &normal)| {
+                let trend = MEAN_OVER_SD * (interpolate(&self.profile, depth) - 1.0);
+                (trend + self.skew.apply(f64::from(normal))) as f32
+            }));
+        }
+        pixels
     }
 }
 
-/// Transforms a standard normal deviate to a shifted log-normal with mean 0, variance 1 and about this skewness.
-fn skewed(normal: f64, skewness: f64) -> f64 {
-    // For small s, the skewness of exp(s·n) is 3 s.
-    let s = skewness / 3.0;
-    if s.abs() < 1e-6 {
-        return normal;
+/// Transforms standard normal deviates n to a shifted log-normal (exp(s·n) − mean) / sd with mean 0, variance 1 and
+/// about a given skewness.
+#[derive(Debug)]
+struct Skew {
+    s: f64,
+    mean: f64,
+    /// Negative if s is.
+    sd: f64,
+}
+
+impl Skew {
+    fn new(skewness: f64) -> Self {
+        // For small s, the skewness of exp(s·n) is 3 s.
+        let s = skewness / 3.0;
+        let variance = libm::expm1(s * s) * libm::exp(s * s);
+        Self { s, mean: libm::exp(0.5 * s * s), sd: variance.sqrt() * s.signum() }
     }
-    let variance = libm::expm1(s * s) * libm::exp(s * s);
-    (libm::exp(s * normal) - libm::exp(0.5 * s * s)) / (variance.sqrt() * s.signum())
+
+    fn apply(&self, normal: f64) -> f64 {
+        if self.s.abs() < 1e-6 { normal } else { (libm::exp(self.s * normal) - self.mean) / self.sd }
+    }
 }
 
 /// Returns the depth of every pixel, 0 at the rim to 1 at the deepest pixel, by a two-pass chamfer distance.
@@ -318,10 +342,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn skewed_preserves_mean_and_variance() {
+    fn a_skew_preserves_mean_and_variance() {
         let mut rng = Key { seed: 5, index: 0 }.stream("test", 0, "skew");
         let n = 40_000;
-        let draws: Vec<f64> = (0..n).map(|_| skewed(random::normal(&mut rng), 0.4)).collect();
+        let draws: Vec<f64> = (0..n).map(|_| Skew::new(0.4).apply(random::normal(&mut rng))).collect();
         let moment = |k: i32| draws.iter().map(|x| libm::pow(*x, f64::from(k))).sum::<f64>() / f64::from(n);
         assert!(moment(1).abs() < 0.02, "{}", moment(1));
         assert!((moment(2) - 1.0).abs() < 0.03, "{}", moment(2));
