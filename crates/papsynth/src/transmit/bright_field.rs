@@ -39,7 +39,6 @@ pub(crate) struct BrightFieldPath {
     overlaps: Option<Overlaps>,
     /// Patches of each object, if several planes use them.
     cached_patches: Option<Vec<Mutex<Option<ObjectPatches>>>>,
-    spare_buffers: Mutex<Vec<PatchBuffers>>,
 }
 
 /// The transmittance of an object, transformed for imaging at any focus.
@@ -53,7 +52,7 @@ struct ObjectPatches {
 
 /// Buffers that are reused from object to object.
 #[derive(Debug, Default)]
-struct PatchBuffers {
+pub(super) struct PatchBuffers {
     transmission: ObjectTransmission,
     object_patches: ObjectPatches,
     scratch: PatchScratch,
@@ -94,7 +93,6 @@ impl BrightFieldPath {
             overlaps: matches!(scene.light, SceneLight::Colour { mixing: Mixing::Spectral, .. })
                 .then(|| Overlaps::new(specimen)),
             groups,
-            spare_buffers: Mutex::default(),
         })
     }
 
@@ -106,7 +104,7 @@ impl BrightFieldPath {
         light: &mut LightBuffers,
     ) -> Result<TransmissionStats, ErrorKind> {
         let View { width, height, .. } = specimen.scene.view;
-        let LightBuffers { channels, lights, images, .. } = light;
+        let LightBuffers { channels, lights, images, patches, .. } = light;
         let mut stats = TransmissionStats { absorbances: vec![Vec::new(); channels.len()], clipped_px: 0 };
         for group in &self.groups {
             lights.resize_with(group.lights.len(), optics_psf::TransmittedLight::default);
@@ -114,7 +112,7 @@ impl BrightFieldPath {
             for (light, of) in lights.iter_mut().zip(&group.lights) {
                 light.reset(of.imager.microscope(), width, height);
             }
-            let absorbances = self.transmit_group(specimen, focus, group, lights, &mut stats.clipped_px)?;
+            let absorbances = self.transmit_group(specimen, focus, group, patches, lights, &mut stats.clipped_px)?;
             let exact = self.optics.imaging == Imaging::Abbe;
             if let (true, FocusAt::Stage(stage_um)) = (exact, focus) {
                 // The multislice image replaces the product.
@@ -128,6 +126,11 @@ impl BrightFieldPath {
                     light.clear();
                     light.multiply(&image?, [0, 0]);
                 }
+            }
+            if matches!(specimen.scene.light, SceneLight::Monochrome { .. }) {
+                lights.iter().zip(&mut *channels).for_each(|(light, channel)| light.image_into(channel));
+                stats.absorbances = absorbances;
+                continue;
             }
             for (light, image) in lights.iter().zip(images.iter_mut()) {
                 image.resize(width * height, 0.0);
@@ -167,11 +170,12 @@ impl BrightFieldPath {
         specimen: Specimen<'_>,
         focus: FocusAt,
         group: &LightGroup,
+        spare: &Mutex<Vec<PatchBuffers>>,
         lights: &mut [optics_psf::TransmittedLight],
         clipped_px: &mut usize,
     ) -> Result<Vec<Vec<f64>>, ErrorKind> {
         let mut absorbances = vec![Vec::new(); lights.len()];
-        let image = |index: usize| self.image_object(specimen, index, focus, group);
+        let image = |index: usize| self.image_object(specimen, index, focus, group, spare);
         threads::each(
             specimen.threads,
             specimen.phantoms.len(),
@@ -190,7 +194,7 @@ impl BrightFieldPath {
                     *clipped_px += factor.clipped;
                     absorbances.extend(own);
                 }
-                self.spare_buffers().push(object_factors.buffers);
+                locked(spare).push(object_factors.buffers);
                 Ok::<_, ErrorKind>(())
             },
         )?;
@@ -223,6 +227,7 @@ impl BrightFieldPath {
         index: usize,
         at: FocusAt,
         group: &LightGroup,
+        spare: &Mutex<Vec<PatchBuffers>>,
     ) -> Result<Option<ObjectFactors>, ErrorKind> {
         let (object, phantom) = (&specimen.scene.objects[index], &specimen.phantoms[index]);
         // Depth and stage position.
@@ -247,12 +252,9 @@ impl BrightFieldPath {
         if !window.meets(width, height, margin_px) {
             return Ok(None);
         }
-        let mut buffers = self.spare_buffers().pop().unwrap_or_default();
+        let mut buffers = locked(spare).pop().unwrap_or_default();
         let PatchBuffers { transmission, object_patches, scratch, factors, refocused } = &mut buffers;
-        let mut cached_patches = self
-            .cached_patches
-            .as_ref()
-            .map(|cached_patches| cached_patches[index].lock().unwrap_or_else(PoisonError::into_inner));
+        let mut cached_patches = self.cached_patches.as_ref().map(|cached_patches| locked(&cached_patches[index]));
         let object_patches = match &mut cached_patches {
             Some(cached_patches) => cached_patches.get_or_insert_with(|| {
                 let mut fresh = ObjectPatches::default();
@@ -313,10 +315,10 @@ impl BrightFieldPath {
             object_patches.restored = feather.blur(&mask, window.width, Border::Zero);
         }
     }
+}
 
-    fn spare_buffers(&self) -> MutexGuard<'_, Vec<PatchBuffers>> {
-        self.spare_buffers.lock().unwrap_or_else(PoisonError::into_inner)
-    }
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Returns a layer of an object in a light, relative to the object's window.
