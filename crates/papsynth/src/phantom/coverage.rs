@@ -1,6 +1,7 @@
 //! Exact coverage of pixels by polygons.
 
 use std::borrow::Cow;
+use std::cell::Cell;
 
 use multiversion::multiversion;
 
@@ -37,6 +38,12 @@ const BLOCK: usize = 16;
 /// Coverage below which a pixel is outside: rounding errors.
 const NEGLIGIBLE: f32 = 1e-5;
 
+thread_local! {
+    /// The memory of the last [`Edges`] of a thread, with all steps 0 again: most blocks of a tile are not crossed, so
+    /// clearing the crossed ones is faster than allocating.
+    static SPARE: Cell<(Vec<[f32; BLOCK]>, Vec<bool>)> = Cell::default();
+}
+
 /// The edges of polygons on the pixels of a tile.
 ///
 /// The coverage of a pixel is the sum of the steps in its row up to that pixel: an edge adds the covered fraction of
@@ -46,7 +53,7 @@ struct Edges {
     corner: Point,
     /// Width and height of the tile.
     size: [usize; 2],
-    /// Rows of blocks of steps.
+    /// Rows of blocks of steps. The vectors may be longer than the tile needs.
     steps: Vec<[f32; BLOCK]>,
     /// Whether any step of a block may be other than 0.
     crossed: Vec<bool>,
@@ -59,13 +66,11 @@ impl Edges {
         let size = [tile.width, tile.height()];
         // An edge at the right border of the tile adds to the two pixels beyond.
         let stride = (size[0] + 2).div_ceil(BLOCK);
-        Self {
-            corner: tile.origin.map(|at| at as f64 - 0.5),
-            size,
-            steps: vec![[0.0; BLOCK]; stride * size[1]],
-            crossed: vec![false; stride * size[1]],
-            stride,
-        }
+        let (mut steps, mut crossed) = SPARE.take();
+        let blocks = steps.len().max(stride * size[1]);
+        steps.resize(blocks, [0.0; BLOCK]);
+        crossed.resize(blocks, false);
+        Self { corner: tile.origin.map(|at| at as f64 - 0.5), size, steps, crossed, stride }
     }
 
     /// Adds the edges of a polygon.
@@ -125,15 +130,16 @@ impl Edges {
     }
 
     /// Calls `visit` with each row of the tile and the total coverage of its pixels, without rows that are not covered.
-    fn for_each_row(&self, tile: &mut Tile, visit: impl Fn(&mut [f32], &[f32])) {
+    fn for_each_row(mut self, tile: &mut Tile, visit: impl Fn(&mut [f32], &[f32])) {
         let mut line = vec![[0.0; BLOCK]; self.stride];
-        let rows = self.steps.chunks_exact(self.stride).zip(self.crossed.chunks_exact(self.stride));
+        let rows = self.steps.chunks_exact_mut(self.stride).zip(self.crossed.chunks_exact_mut(self.stride));
         for (row, (steps, crossed)) in tile.values.chunks_exact_mut(tile.width).zip(rows) {
             if crossed.contains(&true) {
                 sum_steps(&mut line, steps, crossed);
                 visit(row, line.as_flattened());
             }
         }
+        SPARE.set((self.steps, self.crossed));
     }
 }
 
@@ -152,17 +158,18 @@ fn add_edges(edges: &mut Edges, polygon: &[Point]) {
     }
 }
 
-/// Sums the steps of a row from left to right; negative sums count as positive.
+/// Sums the steps of a row from left to right and clears them; negative sums count as positive.
 #[multiversion(targets = "simd")]
-fn sum_steps(line: &mut [[f32; BLOCK]], steps: &[[f32; BLOCK]], crossed: &[bool]) {
+fn sum_steps(line: &mut [[f32; BLOCK]], steps: &mut [[f32; BLOCK]], crossed: &mut [bool]) {
     let mut level = 0.0_f32;
     for ((out, steps), crossed) in line.iter_mut().zip(steps).zip(crossed) {
         *out = [level; BLOCK];
         if *crossed {
-            for (out, step) in out.iter_mut().zip(steps) {
+            for (out, step) in out.iter_mut().zip(&*steps) {
                 level += step;
                 *out = level;
             }
+            (*steps, *crossed) = ([0.0; BLOCK], false);
         }
         for out in out {
             *out = if out.abs() > NEGLIGIBLE { out.abs() } else { 0.0 };
