@@ -9,6 +9,7 @@ use super::manifest::Manifest;
 use super::merge::{begin_manifest, write_manifest};
 use super::occupied::{any_content, recipe_difference, refuse_nested};
 use super::record::{Identity, read_record, recorded_shards};
+use super::rgb_image::Thumbnails;
 use super::set::Dataset;
 use crate::error::Error;
 use crate::files::{Folder, Location};
@@ -70,7 +71,8 @@ impl Dataset {
         if let Some((feature, what)) = layout.needs() {
             return Err(Error::missing_feature(&what, feature, path));
         }
-        let dataset = Self { folder, identity, layout, categories, map, trusted: Arc::default() };
+        let (trusted, thumbnails) = (Arc::default(), Thumbnails::default());
+        let dataset = Self { folder, identity, layout, categories, map, trusted, thumbnails };
         dataset.create_or_compare(given).map_err(|error| dataset.folder.named(error))?;
         Ok(dataset)
     }

@@ -10,7 +10,7 @@ use super::card::{card, croissant};
 use super::images::display_image;
 use super::manifest::{Entry, ManifestFile};
 use super::record::{FORMAT, FORMAT_VERSION, WRITER, read_record, recorded_shards};
-use super::rgb_image::ContactSheet;
+use super::rgb_image::{ContactSheet, RgbImage};
 use super::set::{Dataset, SHARD_FILE_BYTES, Summary};
 use crate::bytes::{hex, json, json_lines};
 use crate::error::Error;
@@ -18,7 +18,7 @@ use crate::files::{Check, FileRecord, Folder};
 use crate::formats::parquet::Table;
 use crate::formats::{Extra, Format, names};
 use crate::read;
-use crate::truth::{AmodalMask, Image, Info, Row, Split, typed_columns};
+use crate::truth::{AmodalMask, FrameSummary, Image, Info, Row, Split, typed_columns};
 use papsynth::white_level as white;
 
 /// Receives the content of a file in pieces.
@@ -269,18 +269,33 @@ fn contact_sheet(dataset: &Dataset, shards: &[u64]) -> Result<Vec<u8>, Error> {
             break;
         }
         let record = read_record(folder, shard)?;
-        let document: Masks = dataset.part_of_document(shard)?;
-        let path = folder.path(&names::coco(shard));
+        let mut document = None;
         for frame in record.frames.iter().take(remaining) {
-            let image = display_image(dataset, frame, shard)?;
-            let masks = document.annotations.iter().filter(|a| a.image_id == frame.index).map(AmodalMask::decode);
-            let masks = masks.collect::<Result<Vec<_>, _>>().map_err(Error::input(&path))?;
-            sheet.add(&names::numbered(frame.index), &image, white(frame.bits), &masks);
+            let thumbnail = match dataset.thumbnails.get(frame.index) {
+                Some(thumbnail) => thumbnail,
+                None => {
+                    let document = match &mut document {
+                        Some(document) => document,
+                        None => document.insert(dataset.part_of_document(shard)?),
+                    };
+                    thumbnail(dataset, frame, shard, document)?
+                }
+            };
+            sheet.add(&names::numbered(frame.index), &thumbnail);
         }
         folder.release(record.files.iter().map(|file| file.path.as_str()));
         remaining = remaining.saturating_sub(record.frames.len());
     }
     sheet.image.to_png().map_err(Error::io("encode", &folder.path(names::SHEET)))
+}
+
+/// Draws the thumbnail of a recorded frame from its files.
+fn thumbnail(dataset: &Dataset, frame: &FrameSummary, shard: u64, document: &Masks) -> Result<RgbImage, Error> {
+    let image = display_image(dataset, frame, shard)?;
+    let masks = document.annotations.iter().filter(|a| a.image_id == frame.index).map(AmodalMask::decode);
+    let masks = masks.collect::<Result<Vec<_>, _>>();
+    let masks = masks.map_err(Error::input(&dataset.folder.path(&names::coco(shard))))?;
+    Ok(ContactSheet::thumbnail(&image, white(frame.bits), &masks))
 }
 
 /// Writes the manifest: the head, the merged files, then the files of each shard, each record after the files it lists.

@@ -1,7 +1,9 @@
 //! Images with outlines of the ground truth, and the contact sheet.
 
+use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use papsynth::truth::{Group, Mask, Run};
 use papsynth::{Finished, Plane};
@@ -212,14 +214,56 @@ impl ContactSheet {
         [Self::SIZE[0] + Self::GAP, Self::SIZE[1] + Self::CAPTION + Self::GAP]
     }
 
-    pub(crate) fn add(&mut self, name: &str, image: &LevelImage, white: u16, masks: &[(Group, Mask)]) {
+    /// Draws the thumbnail of a frame: its image, and the outlines of its objects.
+    pub(crate) fn thumbnail(image: &LevelImage, white: u16, masks: &[(Group, Mask)]) -> RgbImage {
+        let [width, height] = fitted([image.width, image.height()], Self::SIZE);
+        let mut thumbnail = RgbImage::blank(width, height, BACKGROUND);
+        thumbnail.draw(image, white, masks, Place { x: 0, y: 0, width, height });
+        thumbnail
+    }
+
+    pub(crate) fn add(&mut self, name: &str, thumbnail: &RgbImage) {
         let [cell_width, cell_height] = Self::cell();
         let x = Self::GAP + self.frames % Self::COLUMNS * cell_width;
         let y = Self::GAP + self.frames / Self::COLUMNS * cell_height;
         self.frames += 1;
         self.image.write(name, x, y);
-        let [width, height] = fitted([image.width, image.height()], Self::SIZE);
-        self.image.draw(image, white, masks, Place { x, y: y + Self::CAPTION, width, height });
+        let rows = self.image.rgb.chunks_exact_mut(3 * self.image.width).skip(y + Self::CAPTION);
+        for (row, pixels) in rows.zip(thumbnail.rgb.chunks_exact(3 * thumbnail.width)) {
+            row[3 * x..][..pixels.len()].copy_from_slice(pixels);
+        }
+    }
+}
+
+/// Thumbnails of frames that this process wrote, so that a merge does not read their images again. Only those with the
+/// smallest indices are kept, because others cannot be on a contact sheet.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Thumbnails(Arc<Mutex<BTreeMap<u64, RgbImage>>>);
+
+impl Thumbnails {
+    /// Keeps the thumbnail of a frame, if it may be on the contact sheet.
+    pub(crate) fn keep(&self, frame: u64, draw: impl FnOnce() -> RgbImage) {
+        let is_late = |kept: &BTreeMap<u64, RgbImage>| {
+            kept.len() >= ContactSheet::MAX_FRAMES && kept.last_key_value().is_some_and(|(&last, _)| last < frame)
+        };
+        if is_late(&self.kept()) {
+            return;
+        }
+        let thumbnail = draw();
+        let mut kept = self.kept();
+        kept.insert(frame, thumbnail);
+        if kept.len() > ContactSheet::MAX_FRAMES {
+            kept.pop_last();
+        }
+    }
+
+    /// Returns the thumbnail of a frame, if it is kept.
+    pub(crate) fn get(&self, frame: u64) -> Option<RgbImage> {
+        self.kept().get(&frame).cloned()
+    }
+
+    fn kept(&self) -> MutexGuard<'_, BTreeMap<u64, RgbImage>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -255,6 +299,21 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    #[test]
+    fn the_thumbnails_of_the_first_frames_are_kept() {
+        let thumbnails = Thumbnails::default();
+        let of = |frame: u64| RgbImage::blank(usize::try_from(frame % 7).unwrap() + 1, 1, BACKGROUND);
+        let mut frames: Vec<u64> = (0..60).map(|i| i * 37 % 60).collect();
+        frames.push(3);
+        for frame in frames {
+            thumbnails.keep(frame, || of(frame));
+        }
+        for frame in 0..60 {
+            let expected = (frame < ContactSheet::MAX_FRAMES as u64).then(|| of(frame));
+            assert_eq!(thumbnails.get(frame), expected, "{frame}");
+        }
+    }
 
     proptest! {
         #[test]

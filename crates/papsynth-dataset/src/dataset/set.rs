@@ -11,6 +11,7 @@ use serde::de::DeserializeOwned;
 
 use super::manifest::Manifest;
 use super::record::{Identity, recorded_shards};
+use super::rgb_image::Thumbnails;
 use crate::bytes::sha256;
 use crate::error::{Error, InputError};
 use crate::files::{FileRecord, Folder, Location};
@@ -37,6 +38,7 @@ pub struct Dataset {
     pub(crate) map: Option<String>,
     /// Files whose SHA-256 was compared with their record.
     pub(super) trusted: Arc<Mutex<BTreeSet<String>>>,
+    pub(super) thumbnails: Thumbnails,
 }
 
 /// Counts of a data set.
@@ -72,7 +74,7 @@ impl Dataset {
             |file: &&FileRecord| !file.path.contains('/') && !names::OF_EVERY_SET.contains(&file.path.as_str());
         let map = manifest.files.iter().find(is_map).map(|file| file.path.clone());
         let Manifest { identity, layout, categories, .. } = manifest;
-        Self { folder, identity, layout, categories, map, trusted: Arc::default() }
+        Self { folder, identity, layout, categories, map, trusted: Arc::default(), thumbnails: Thumbnails::default() }
     }
 
     /// The folder; for a data set in an object store, the folder of local copies.

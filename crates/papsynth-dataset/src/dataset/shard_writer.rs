@@ -8,11 +8,13 @@ use papsynth::truth::{Mask, Truth};
 use papsynth::{Finished, Plane, white_level as white};
 
 use super::record::{FORMAT_VERSION, ShardRecord, WRITER, read_record};
+use super::rgb_image::ContactSheet;
 use super::set::Dataset;
 use crate::error::Error;
 use crate::files::{FileRecord, Output, Pending};
 use crate::formats::parquet::Table;
-use crate::formats::{Field, Files, Sink, names};
+use crate::formats::{Depth, Extra, Field, Files, Sink, names};
+use crate::read::LevelImage;
 use crate::truth::{Document, FrameSummary, Image, Info, Row, extends_beyond, table, typed_columns};
 
 impl Dataset {
@@ -142,10 +144,26 @@ impl ShardWriter<'_> {
         for sink in &mut self.sinks {
             sink.field(&field, &mut self.files)?;
         }
+        self.keep_thumbnail(&frame, truth, levels);
         let rows = table(truth, frame.index, self.done.is_empty());
         self.truth.add(document, &rows, truth, frame.index)?;
         self.done.push(frame);
         Ok(&self.done[self.done.len() - 1])
+    }
+
+    /// Keeps the thumbnail of a frame for the contact sheet, if a merge would draw the same from its files.
+    fn keep_thumbnail(&self, frame: &FrameSummary, truth: &Truth, levels: Vec<u16>) {
+        let Dataset { layout, thumbnails, .. } = self.dataset;
+        let is_exact = layout.best_format(false).is_some_and(|format| format.depth() == Depth::Camera);
+        if frame.is_stack() || !is_exact || !layout.has_extra(Extra::ContactSheet) {
+            return;
+        }
+        thumbnails.keep(frame.index, || {
+            let FrameSummary { width, channels, bits, .. } = *frame;
+            let image = LevelImage { width, channels, levels, white: white(bits) };
+            let masks: Vec<_> = truth.objects.iter().map(|object| (object.group(), object.amodal.clone())).collect();
+            ContactSheet::thumbnail(&image, white(bits), &masks)
+        });
     }
 
     /// Renames the files to their names, then writes the record that completes the shard.
