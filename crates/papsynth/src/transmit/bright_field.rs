@@ -106,11 +106,15 @@ impl BrightFieldPath {
         light: &mut LightBuffers,
     ) -> Result<TransmissionStats, ErrorKind> {
         let View { width, height, .. } = specimen.scene.view;
-        let LightBuffers { channels, lights, images, .. } = light;
+        let LightBuffers { channels, lights, images: light_images, .. } = light;
+        let is_sum = self.groups.len() > 1;
+        if is_sum {
+            channels.iter_mut().for_each(|channel| clear(channel, width * height));
+        }
         let mut stats = TransmissionStats { absorbances: vec![Vec::new(); channels.len()], clipped_px: 0 };
         for group in &self.groups {
             lights.resize_with(group.lights.len(), optics_psf::TransmittedLight::default);
-            images.resize(group.lights.len(), Vec::new());
+            light_images.resize(if is_sum { group.lights.len() } else { 0 }, Vec::new());
             for (light, of) in lights.iter_mut().zip(&group.lights) {
                 light.reset(of.imager.microscope(), width, height);
             }
@@ -129,6 +133,8 @@ impl BrightFieldPath {
                     light.multiply(&image?, [0, 0]);
                 }
             }
+            // A light that is the only one of its channel is written to it.
+            let images = if is_sum { &mut *light_images } else { &mut *channels };
             for (light, image) in lights.iter().zip(images.iter_mut()) {
                 image.resize(width * height, 0.0);
                 light.image_into(image);
@@ -137,9 +143,11 @@ impl BrightFieldPath {
                 let blur_px = |index: usize| self.blur_px(specimen, index, focus, group);
                 overlaps.correct(colour, specimen, blur_px, images)?;
             }
-            for ((of, image), absorbances) in group.lights.iter().zip(&*images).zip(&absorbances) {
+            for (light, (of, absorbances)) in group.lights.iter().zip(&absorbances).enumerate() {
                 for (channel, &weight) in of.weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
-                    add_light(&mut channels[channel], image, weight as f32);
+                    if is_sum {
+                        add_light(&mut channels[channel], &light_images[light], weight as f32);
+                    }
                     let sums = &mut stats.absorbances[channel];
                     sums.resize(absorbances.len(), 0.0);
                     sums.iter_mut().zip(absorbances).for_each(|(sum, value)| *sum += weight * value);

@@ -3,7 +3,7 @@
 use core::cmp::Ordering;
 use std::borrow::Cow;
 
-use dye_spectra::{Amounts, Colour, DYES};
+use dye_spectra::{Amounts, Colour, Curve, DYES};
 use multiversion::multiversion;
 use optics_psf::{Gaussian, Scratch};
 use portable_numerics::elementary::exp10_from;
@@ -35,7 +35,18 @@ pub(super) struct ObjectTransmission {
     buffers: MixerBuffers,
 }
 
-/// The absorbance at one wavelength as a negative number, or the amounts of dyes; empty planes stand for zero.
+/// The conversion of the absorbance of some pieces to transmittance.
+enum Mixture<'a> {
+    /// At one wavelength, µm.
+    Wavelength(f64),
+    /// All pieces have the same dyes: one number per sample is sufficient.
+    Proportional(Box<Curve>),
+    /// Any amounts of dyes.
+    Dyes(&'a Colour),
+}
+
+/// The absorbance at one wavelength as a negative number, the total amount of dye, or the amount of each dye; empty
+/// planes stand for zero.
 type AmountPlanes = [Vec<f32>; DYES];
 
 /// Working memory of [`DyeMixer`].
@@ -216,11 +227,13 @@ impl DyeMixer {
             ((piece, Cow::Owned(mean)), (piece, Cow::Owned(deviation)))
         });
         let (means, of_deviations): (Vec<_>, Vec<_>) = moments.unzip();
-        self.transmittance(&means, window, &mut layer.transmittance, amounts);
-        self.amounts(&of_deviations, window, deviations);
+        let mixture = self.mixture(own());
+        mixture.amounts(&means, window, amounts);
+        mixture.transmit(amounts, window.width * window.height, &mut layer.transmittance);
+        mixture.amounts(&of_deviations, window, deviations);
         // T(A) is not linear: the mean of its values at the mean ± the deviation of A approximates that of a sample.
         steep.find(amounts, deviations);
-        self.transmit(&steep.amounts, 2 * steep.places.len(), &mut steep.transmittance);
+        mixture.transmit(&steep.amounts, 2 * steep.places.len(), &mut steep.transmittance);
         for (transmittance, found) in layer.transmittance.iter_mut().zip(&steep.transmittance) {
             let (above, below) = found.split_at(steep.places.len());
             for ((place, above), below) in steep.places.iter().zip(above).zip(below) {
@@ -238,54 +251,19 @@ impl DyeMixer {
         transmittance: &mut Vec<Vec<f32>>,
         amounts: &mut AmountPlanes,
     ) {
-        self.amounts(tiles, window, amounts);
-        self.transmit(amounts, window.width * window.height, transmittance);
+        let mixture = self.mixture(tiles.iter().map(|(piece, _)| *piece));
+        mixture.amounts(tiles, window, amounts);
+        mixture.transmit(amounts, window.width * window.height, transmittance);
     }
 
-    /// Adds the amounts of tiles of the same sampling.
-    fn amounts(&self, tiles: &[(&Piece, Cow<'_, Tile>)], window: Window, amounts: &mut AmountPlanes) {
-        let samples = window.width * window.height;
+    /// Returns how the absorbance of these pieces becomes transmittance.
+    fn mixture<'p>(&self, mut pieces: impl Iterator<Item = &'p Piece>) -> Mixture<'_> {
         match self {
-            Self::Monochrome(wavelength) => {
-                let [absorbance, ..] = amounts;
-                clear(absorbance, samples);
-                for (piece, tile) in tiles {
-                    let strength = dye_spectra::absorbance(&piece.dyes, *wavelength) as f32;
-                    add(absorbance, window, tile, -strength);
-                }
-            }
-            Self::Colour(_) => {
-                for (dye, amount) in amounts.iter_mut().enumerate() {
-                    amount.clear();
-                    // A dye without amounts needs no plane.
-                    if tiles.iter().any(|(piece, _)| piece.dyes[dye] > 0.0) {
-                        amount.resize(samples, 0.0);
-                    }
-                    for (piece, tile) in tiles.iter().filter(|(piece, _)| piece.dyes[dye] > 0.0) {
-                        add(amount, window, tile, piece.dyes[dye] as f32);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Computes the transmittance of amounts in each channel.
-    fn transmit(&self, amounts: &AmountPlanes, samples: usize, transmittance: &mut Vec<Vec<f32>>) {
-        transmittance.resize(self.channels(), Vec::new());
-        match self {
-            // Beer and Lambert: T = 10^(−A).
-            Self::Monochrome(_) => {
-                let [transmittance] = &mut transmittance[..] else { return };
-                clear(transmittance, samples);
-                exp10_from(&amounts[0], transmittance);
-            }
+            Self::Monochrome(wavelength) => Mixture::Wavelength(*wavelength),
             Self::Colour(colour) => {
-                for channel in transmittance.iter_mut() {
-                    channel.resize(samples, 0.0);
-                }
-                let [r, g, b] = &mut transmittance[..] else { return };
-                let [h, e, l, o, n] = amounts;
-                colour.transmittance_into([h, e, l, o, n], [r, g, b]);
+                let dyes = pieces.next().map(|first| first.dyes).filter(|dyes| pieces.all(|piece| piece.dyes == *dyes));
+                let curve = dyes.and_then(|dyes| colour.curve(&proportions(&dyes)).ok());
+                curve.map_or(Mixture::Dyes(colour), |curve| Mixture::Proportional(Box::new(curve)))
             }
         }
     }
@@ -300,6 +278,57 @@ impl DyeMixer {
             add(&mut layer.phase_rad, window, tile, piece.phase_rad as f32);
         }
         layer
+    }
+}
+
+/// Returns the sum of the amounts of all dyes.
+pub(super) fn total(dyes: &Amounts) -> f64 {
+    dyes.iter().sum()
+}
+
+/// Returns the amounts of dyes relative to their sum.
+pub(super) fn proportions(dyes: &Amounts) -> Amounts {
+    dyes.map(|amount| amount / total(dyes).max(f64::MIN_POSITIVE))
+}
+
+impl Mixture<'_> {
+    /// Adds the amounts of tiles of the same sampling.
+    fn amounts(&self, tiles: &[(&Piece, Cow<'_, Tile>)], window: Window, amounts: &mut AmountPlanes) {
+        for (number, amount) in amounts.iter_mut().enumerate() {
+            let strength = |piece: &Piece| match (self, number) {
+                (Self::Wavelength(wavelength), 0) => -dye_spectra::absorbance(&piece.dyes, *wavelength),
+                (Self::Proportional(_), 0) => total(&piece.dyes),
+                (Self::Wavelength(_) | Self::Proportional(_), _) => 0.0,
+                (Self::Dyes(_), dye) => piece.dyes[dye],
+            };
+            amount.clear();
+            // A dye without amounts needs no plane.
+            if number == 0 || tiles.iter().any(|(piece, _)| strength(piece) != 0.0) {
+                amount.resize(window.width * window.height, 0.0);
+            }
+            for (piece, tile) in tiles.iter().filter(|(piece, _)| strength(piece) != 0.0) {
+                add(amount, window, tile, strength(piece) as f32);
+            }
+        }
+    }
+
+    /// Computes the transmittance of amounts in each channel.
+    fn transmit(&self, amounts: &AmountPlanes, samples: usize, transmittance: &mut Vec<Vec<f32>>) {
+        let channels = if matches!(self, Self::Wavelength(_)) { 1 } else { 3 };
+        transmittance.resize(channels, Vec::new());
+        transmittance.iter_mut().for_each(|channel| channel.resize(samples, 0.0));
+        match (self, &mut transmittance[..]) {
+            // Beer and Lambert: T = 10^(−A).
+            (Self::Wavelength(_), [transmittance]) => {
+                transmittance.fill(0.0);
+                exp10_from(&amounts[0], transmittance);
+            }
+            (Self::Proportional(curve), [r, g, b]) => curve.transmittance_into(&amounts[0], [r, g, b]),
+            (Self::Dyes(colour), [r, g, b]) => {
+                colour.transmittance_into(amounts.each_ref().map(|plane| &plane[..]), [r, g, b]);
+            }
+            _ => {}
+        }
     }
 }
 
