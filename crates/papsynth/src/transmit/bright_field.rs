@@ -135,9 +135,8 @@ impl BrightFieldPath {
             }
             // A light that is the only one of its channel is written to it.
             let images = if is_sum { &mut *light_images } else { &mut *channels };
-            for (light, image) in lights.iter().zip(images.iter_mut()) {
-                image.resize(width * height, 0.0);
-                light.image_into(image);
+            for (light, image) in lights.iter_mut().zip(images.iter_mut()) {
+                light.swap_image(image);
             }
             if let (false, Some(overlaps), DyeMixer::Colour(colour)) = (exact, &self.overlaps, &group.mixer) {
                 let blur_px = |index: usize| self.blur_px(specimen, index, focus, group);

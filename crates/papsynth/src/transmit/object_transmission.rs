@@ -57,10 +57,11 @@ struct MixerBuffers {
     steep: SteepSamples,
 }
 
-/// Samples within which amounts vary.
+/// Blocks of samples within which amounts vary.
 #[derive(Debug, Default)]
 struct SteepSamples {
-    places: Vec<u32>,
+    /// First sample of each block.
+    blocks: Vec<usize>,
     /// Amounts above the mean of all samples, then those below.
     amounts: AmountPlanes,
     transmittance: Vec<Vec<f32>>,
@@ -233,12 +234,9 @@ impl DyeMixer {
         mixture.amounts(&of_deviations, window, deviations);
         // T(A) is not linear: the mean of its values at the mean ± the deviation of A approximates that of a sample.
         steep.find(amounts, deviations);
-        mixture.transmit(&steep.amounts, 2 * steep.places.len(), &mut steep.transmittance);
+        mixture.transmit(&steep.amounts, steep.len(), &mut steep.transmittance);
         for (transmittance, found) in layer.transmittance.iter_mut().zip(&steep.transmittance) {
-            let (above, below) = found.split_at(steep.places.len());
-            for ((place, above), below) in steep.places.iter().zip(above).zip(below) {
-                transmittance[*place as usize] = 0.5 * (above + below);
-            }
+            steep.replace(transmittance, found);
         }
         means
     }
@@ -333,39 +331,82 @@ impl Mixture<'_> {
 }
 
 impl SteepSamples {
-    /// Finds the samples in which the sum of deviations is large, and collects their amounts.
+    /// Finds the blocks with a sample in which the sum of deviations is large, and collects their amounts.
     fn find(&mut self, amounts: &AmountPlanes, deviations: &AmountPlanes) {
-        let Self { places, amounts: own, .. } = self;
-        places.clear();
-        let samples = deviations.iter().map(Vec::len).max().unwrap_or(0);
-        let planes: Vec<&[f32]> = deviations.iter().filter(|plane| !plane.is_empty()).map(Vec::as_slice).collect();
-        for first in (0..samples).step_by(BLOCK) {
-            let mut sums = [0.0_f32; BLOCK];
-            for plane in &planes {
-                sums.iter_mut().zip(&plane[first..]).for_each(|(sum, deviation)| *sum += deviation.abs());
-            }
-            if sums.iter().fold(false, |steep, sum| steep | (*sum > STEEP)) {
-                let steep = sums.iter().enumerate().filter(|(_, sum)| **sum > STEEP);
-                places.extend(steep.map(|(i, _)| (first + i) as u32));
-            }
-        }
+        let Self { blocks, amounts: own, .. } = self;
+        find_steep(deviations, blocks);
         for ((own, amounts), deviations) in own.iter_mut().zip(amounts).zip(deviations) {
             own.clear();
-            if amounts.is_empty() || places.is_empty() {
+            if amounts.is_empty() {
                 continue;
             }
             for sign in [1.0, -1.0] {
-                own.extend(places.iter().map(|place| {
-                    let deviation = deviations.get(*place as usize).copied().unwrap_or(0.0);
-                    amounts[*place as usize] + sign * deviation
-                }));
+                for &first in &*blocks {
+                    let (at, amounts) = (own.len(), block_at(amounts, first));
+                    own.extend_from_slice(amounts);
+                    if !deviations.is_empty() {
+                        add_scaled(&mut own[at..], block_at(deviations, first), sign);
+                    }
+                }
             }
         }
+    }
+
+    /// Replaces the transmittance in the blocks by the mean above and below the mean amount.
+    fn replace(&self, transmittance: &mut [f32], found: &[f32]) {
+        let (mut above, mut below) = found.split_at(found.len() / 2);
+        for &first in &self.blocks {
+            let to = &mut transmittance[first..];
+            let length = to.len().min(BLOCK);
+            set_mean(&mut to[..length], &above[..length], &below[..length]);
+            (above, below) = (&above[length..], &below[length..]);
+        }
+    }
+
+    /// Returns the number of collected amounts.
+    fn len(&self) -> usize {
+        self.amounts[0].len()
     }
 }
 
 /// Samples that are compared together.
 const BLOCK: usize = 16;
+
+/// Returns the samples of a block; the last one may be shorter.
+fn block_at(plane: &[f32], first: usize) -> &[f32] {
+    &plane[first..plane.len().min(first + BLOCK)]
+}
+
+/// Writes the first sample of every block that contains a large sum of deviations.
+#[multiversion(targets = "simd")]
+fn find_steep(deviations: &AmountPlanes, blocks: &mut Vec<usize>) {
+    blocks.clear();
+    let samples = deviations.iter().map(Vec::len).max().unwrap_or(0);
+    for first in (0..samples).step_by(BLOCK) {
+        let mut sums = [0.0_f32; BLOCK];
+        for plane in deviations.iter().filter(|plane| !plane.is_empty()) {
+            let block = &plane[first..];
+            if let Some(block) = block.first_chunk::<BLOCK>() {
+                sums.iter_mut().zip(block).for_each(|(sum, deviation)| *sum += deviation.abs());
+            } else {
+                sums.iter_mut().zip(block).for_each(|(sum, deviation)| *sum += deviation.abs());
+            }
+        }
+        if sums.iter().fold(false, |steep, sum| steep | (*sum > STEEP)) {
+            blocks.push(first);
+        }
+    }
+}
+
+#[multiversion(targets = "simd")]
+fn set_mean(to: &mut [f32], above: &[f32], below: &[f32]) {
+    to.iter_mut().zip(above.iter().zip(below)).for_each(|(to, (above, below))| *to = 0.5 * (above + below));
+}
+
+#[multiversion(targets = "simd")]
+pub(super) fn add_scaled(values: &mut [f32], others: &[f32], factor: f32) {
+    values.iter_mut().zip(others).for_each(|(value, other)| *value += factor * other);
+}
 
 /// Returns the absorbance of a piece sampled at another distance, at least in a window.
 fn resampled(piece: &Piece, step: usize, window: Window) -> Cow<'_, Tile> {

@@ -14,7 +14,7 @@ use multiversion::multiversion;
 use optics_psf::{Gaussian, Method, Scratch};
 
 use super::light::Specimen;
-use super::object_transmission::{Window, blurred_tile, clear, proportions, total};
+use super::object_transmission::{Window, add_scaled, blurred_tile, clear, proportions, total};
 use crate::error::ErrorKind;
 use crate::phantom::piece::{Phantom, Piece};
 use crate::phantom::tile::Tile;
@@ -284,11 +284,6 @@ fn stained_window(phantom: &Phantom, scene: &Scene) -> Option<Window> {
     });
     let window = Window::around(strong, scene.oversampling())?;
     (scene.frame.is_some() || window.meets(width, height, 0)).then_some(window)
-}
-
-#[multiversion(targets = "simd")]
-fn add_scaled(values: &mut [f32], others: &[f32], factor: f32) {
-    values.iter_mut().zip(others).for_each(|(value, other)| *value += factor * other);
 }
 
 #[multiversion(targets = "simd")]
