@@ -122,6 +122,12 @@ impl<'a> StainedPiece<'a> {
     fn new(colour: &Colour, absorbance: Cow<'a, Tile>, dyes: Amounts) -> Result<Self, ErrorKind> {
         Ok(Self { absorbance, dyes, total: total(&dyes) as f32, curve: colour.curve(&proportions(&dyes))? })
     }
+
+    /// Returns the absorbance in a row of the image.
+    fn values(&self, y: usize) -> Option<&[f32]> {
+        let row = usize::try_from(y as i64 - self.absorbance.origin[1]).ok()?;
+        self.absorbance.values.chunks_exact(self.absorbance.width).nth(row)
+    }
 }
 
 impl<'a> StainedObject<'a> {
@@ -144,9 +150,7 @@ impl<'a> StainedObject<'a> {
     /// Returns the pieces in a row of the image, with the range of their columns in the image and their absorbance.
     fn row(&self, y: usize, width: usize) -> impl Iterator<Item = (&StainedPiece<'a>, Range<usize>, &[f32])> + Clone {
         self.pieces.iter().filter_map(move |piece| {
-            let tile = &*piece.absorbance;
-            let row = usize::try_from(y as i64 - tile.origin[1]).ok()?;
-            let values = tile.values.chunks_exact(tile.width).nth(row)?;
+            let (values, tile) = (piece.values(y)?, &*piece.absorbance);
             let left = tile.origin[0].max(0);
             let right = (tile.origin[0] + tile.width as i64).min(width as i64);
             (left < right).then(|| {
@@ -221,8 +225,7 @@ impl RowBuffers {
                 }
             }
             // The method depends on the object and the row, not on the span, which may end at the border of the image.
-            let mut alone = object.row(y, width);
-            if let (Some(_), None) = (alone.next(), alone.next()) {
+            if object.pieces.iter().filter(|piece| piece.values(y).is_some()).count() == 1 {
                 for (piece, place, values) in pieces {
                     clear(stain, values.len());
                     add_scaled(stain, values, piece.total);
@@ -365,7 +368,7 @@ mod tests {
                 assert!((f64::from(channel[i]) - expected).abs() < 1e-4, "{x} {y} {c}: {} {expected}", channel[i]);
             }
         }
-        assert!(corrected > 500);
+        assert!(corrected > 300, "{corrected}");
     }
 
     #[test]
