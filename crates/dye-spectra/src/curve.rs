@@ -1,3 +1,5 @@
+use std::sync::LazyLock;
+
 use multiversion::multiversion;
 
 use crate::dye::{Amounts, DYES};
@@ -16,7 +18,7 @@ const MAX_ABSORBANCE: f64 = 3.0;
 pub struct Curve {
     /// Coefficients of Q_c in powers of u = amount·`scale` − 1, from −1 to 1. Light is 1 − amount·Q_c(u), exactly 1 at
     /// amount 0.
-    coefficients: [[f32; DEGREE + 1]; 3],
+    coefficients: [[f32; POINTS]; 3],
     scale: f32,
     /// Largest amount for the polynomials.
     max_amount: f32,
@@ -97,26 +99,48 @@ fn rows(curve: &Curve, amount: &[f32], out: [&mut [f32]; 3]) {
     }
 }
 
+/// Number of interpolation points.
+const POINTS: usize = DEGREE + 1;
+
+/// Polynomial interpolation at the Chebyshev points of −1 to 1.
+struct Chebyshev {
+    points: [f64; POINTS],
+    /// Coefficients, in powers of u, of the polynomial that is 1 at a point and 0 at all others.
+    powers: [[f64; POINTS]; POINTS],
+}
+
+impl Chebyshev {
+    fn new() -> Self {
+        let angle = |k: usize| core::f64::consts::PI * (k as f64 + 0.5) / POINTS as f64;
+        let mut powers = [[0.0; POINTS]; POINTS];
+        // Chebyshev polynomials in powers of u: T₀ = 1, T₁ = u, Tₙ₊₁ = 2u·Tₙ − Tₙ₋₁.
+        let (mut before, mut now) = ([0.0; POINTS], [0.0; POINTS]);
+        now[0] = 1.0;
+        for n in 0..POINTS {
+            for (k, powers) in powers.iter_mut().enumerate() {
+                let coefficient = libm::cos(n as f64 * angle(k)) * if n == 0 { 1.0 } else { 2.0 } / POINTS as f64;
+                for (power, term) in powers.iter_mut().zip(now) {
+                    *power += coefficient * term;
+                }
+            }
+            let factor = if n == 0 { 1.0 } else { 2.0 };
+            let next = std::array::from_fn(|i| factor * if i == 0 { 0.0 } else { now[i - 1] } - before[i]);
+            (before, now) = (now, next);
+        }
+        Self { points: std::array::from_fn(|k| libm::cos(angle(k))), powers }
+    }
+}
+
 /// Returns the polynomials in powers of u that interpolate three functions at Chebyshev points of −1 to 1.
-fn interpolate(f: impl Fn(f64) -> [f64; 3]) -> [[f64; DEGREE + 1]; 3] {
-    const POINTS: usize = DEGREE + 1;
-    let mut powers = [[0.0; POINTS]; 3];
-    let angle = |k: usize| core::f64::consts::PI * (k as f64 + 0.5) / POINTS as f64;
-    let values: [[f64; 3]; POINTS] = std::array::from_fn(|k| f(libm::cos(angle(k))));
-    // Chebyshev polynomials in powers of u: T₀ = 1, T₁ = u, Tₙ₊₁ = 2u·Tₙ − Tₙ₋₁.
-    let (mut before, mut now) = ([0.0; POINTS], [0.0; POINTS]);
-    now[0] = 1.0;
-    for n in 0..POINTS {
-        for (c, powers) in powers.iter_mut().enumerate() {
-            let sum: f64 = values.iter().enumerate().map(|(k, v)| v[c] * libm::cos(n as f64 * angle(k))).sum();
-            let coefficient = sum * if n == 0 { 1.0 } else { 2.0 } / POINTS as f64;
-            for (power, term) in powers.iter_mut().zip(now) {
-                *power += coefficient * term;
+fn interpolate(f: impl Fn(f64) -> [f64; 3]) -> [[f64; POINTS]; 3] {
+    static CHEBYSHEV: LazyLock<Chebyshev> = LazyLock::new(Chebyshev::new);
+    let mut sums = [[0.0; POINTS]; 3];
+    for (&point, powers) in CHEBYSHEV.points.iter().zip(&CHEBYSHEV.powers) {
+        for (sums, value) in sums.iter_mut().zip(f(point)) {
+            for (sum, power) in sums.iter_mut().zip(powers) {
+                *sum += value * power;
             }
         }
-        let factor = if n == 0 { 1.0 } else { 2.0 };
-        let next = std::array::from_fn(|i| factor * if i == 0 { 0.0 } else { now[i - 1] } - before[i]);
-        (before, now) = (now, next);
     }
-    powers
+    sums
 }

@@ -209,8 +209,8 @@ impl Canvas {
         self.transform(amplitude, width, offset, of_amplitude, grid);
         if behind.is_empty() {
             // a² = 2a − (1 − T).
-            of_square.plus.clone_from(&of_amplitude.plus);
-            squares_of(&mut of_square.plus, &spectra.light);
+            of_square.plus.resize(of_amplitude.plus.len(), ZERO);
+            squares_of(&of_amplitude.plus, &spectra.light, &mut of_square.plus);
         } else {
             square.clear();
             square.extend(amplitude.iter().map(|a| a * a));
@@ -378,16 +378,17 @@ pub(crate) fn amplitudes(absorbed: &[f32], behind: &[f32], amplitude: &mut [f32]
     }
 }
 
-/// Replaces the spectrum of a = 1 − √T by that of a² = 2a − (1 − T), for the spectrum of 1 − T + iφ.
+/// Computes the spectrum of a² = 2a − (1 − T) from those of a = 1 − √T and of 1 − T + iφ.
 #[multiversion(targets = "simd")]
-fn squares_of(amplitude: &mut [Lanes], light: &Spectrum) {
+fn squares_of(amplitude: &[Lanes], light: &Spectrum, square: &mut [Lanes]) {
     // (F(k) + F*(−k))/2, which is F(k) for a real image.
     let (minus, sign) = if light.minus.is_empty() { (&light.plus, 0.5) } else { (&light.minus, -0.5) };
     let factors = [[0.5; LANES], [sign; LANES]];
-    for ((a, plus), minus) in amplitude.iter_mut().zip(&light.plus).zip(minus) {
+    for (((square, a), plus), minus) in square.iter_mut().zip(amplitude).zip(&light.plus).zip(minus) {
         let from = plus.as_flattened().iter().zip(minus.as_flattened()).zip(factors.as_flattened());
-        for (a, ((plus, minus), factor)) in a.as_flattened_mut().iter_mut().zip(from) {
-            *a = 2.0 * *a - (0.5 * plus + factor * minus);
+        let both = square.as_flattened_mut().iter_mut().zip(a.as_flattened());
+        for ((square, a), ((plus, minus), factor)) in both.zip(from) {
+            *square = 2.0 * a - (0.5 * plus + factor * minus);
         }
     }
 }

@@ -59,6 +59,13 @@ impl TransmittedLight {
         out.copy_from_slice(&self.product);
         add_stray_light(out, self.stray_light);
     }
+
+    /// As [`image_into`](Self::image_into), but exchanges the memory of the image and of `out` instead of copying.
+    /// Afterwards, the light must be [`reset`](Self::reset).
+    pub fn swap_image(&mut self, out: &mut Vec<f32>) {
+        add_stray_light(&mut self.product, self.stray_light);
+        core::mem::swap(&mut self.product, out);
+    }
 }
 
 #[multiversion(targets = "simd")]

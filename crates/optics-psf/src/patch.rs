@@ -174,8 +174,9 @@ impl PatchImager {
 
     /// Computes the imaging properties at a depth and stage position: see [`Microscope::transfer`].
     ///
-    /// Transfer functions are interpolated between a few depths, a third of a µm apart. Each takes about 0.1 ms and
-    /// is cached per stage position; all else takes some 10 µs. The result does not depend on the state of the cache.
+    /// Up to 12 µm from the slide's focal plane, transfer functions are interpolated between a few depths, a third of a
+    /// µm apart. Each takes about 0.1 ms and is cached per stage position; all else takes some 10 µs. The result does
+    /// not depend on the state of the cache.
     ///
     /// # Errors
     ///
@@ -357,8 +358,8 @@ impl PatchImager {
         let added = if layer.correction == Correction::Added { focus.filter.correction } else { 0.0 };
         if cached.is_none() || entry.added != added {
             if added > 0.0 {
-                corrected.clone_from(absorbed);
-                add_scaled(corrected, &layer.variance, added);
+                corrected.resize(absorbed.len(), 0.0);
+                add_scaled(absorbed, &layer.variance, added, corrected);
                 samples.absorbed = corrected;
             }
             canvas.load(samples, &mut entry.spectra, scratch);
@@ -383,6 +384,8 @@ impl PatchImager {
 
 /// Transfer functions of any depth, interpolated between equidistant depths. They are computed on demand.
 ///
+/// Far from the specimen, objects are few and at different depths: their transfer functions are computed directly.
+///
 /// As a function of depth, a transfer function has no frequency above (n − √(n² − NA²))/λ. Sampled a few times per
 /// period, polynomial interpolation has an error below 0.001.
 #[derive(Debug)]
@@ -399,6 +402,9 @@ const SAMPLES_PER_PERIOD: f64 = 4.6;
 /// Interpolation nodes on each side of a depth.
 const SIDE: i64 = 5;
 
+/// Depth in µm from which transfer functions are computed directly.
+const FAR_UM: f64 = 12.0;
+
 /// Largest number of cached table entries.
 const MOST_ENTRIES: usize = 1 << 20;
 
@@ -412,6 +418,9 @@ impl TransferCache {
 
     /// Returns the transfer function at a depth and stage position. The result does not depend on earlier calls.
     fn transfer(&self, depth_um: f64, stage_um: f64) -> Transfer {
+        if depth_um.abs() >= FAR_UM {
+            return Transfer::new(&self.microscope, depth_um, stage_um);
+        }
         // Indices count away from the objective.
         let position = -depth_um / self.step_um;
         let below = position.floor();
@@ -505,6 +514,15 @@ mod tests {
             assert_eq!(transfers.transfer(depth, stage), fresh().transfer(depth, stage));
         }
     }
+
+    #[test]
+    fn transfer_functions_of_far_objects_are_exact() {
+        let transfers = TransferCache::new(&Microscope::new(&MicroscopeParams::default()).unwrap());
+        for (depth, stage) in [(FAR_UM, 0.0), (-31.7, 0.5)] {
+            assert_eq!(transfers.transfer(depth, stage), Transfer::new(&transfers.microscope, depth, stage));
+        }
+        assert!(transfers.cached.lock().unwrap().is_empty());
+    }
 }
 
 /// Computes absorbed light T₀ − T, where T₀ is 1 if `behind` is empty.
@@ -519,6 +537,6 @@ fn absorb(transmittance: &[f32], behind: &[f32], absorbed: &mut [f32]) {
 }
 
 #[multiversion(targets = "simd")]
-fn add_scaled(values: &mut [f32], others: &[f32], factor: f32) {
-    values.iter_mut().zip(others).for_each(|(value, other)| *value += factor * other);
+fn add_scaled(values: &[f32], others: &[f32], factor: f32, sums: &mut [f32]) {
+    sums.iter_mut().zip(values.iter().zip(others)).for_each(|(sum, (value, other))| *sum = value + factor * other);
 }

@@ -192,7 +192,7 @@ impl Detector {
             expose(channel, electrons, *key, levels);
         }
         match &self.srgb {
-            Some(srgb) => srgb.render(levels, grey, |value| (value + 0.5).min(srgb.largest) as u16),
+            Some(srgb) => render_levels(srgb, levels, grey),
             None => interleave(levels, grey),
         }
     }
@@ -227,7 +227,7 @@ impl Detector {
             channel.camera.mean_dn_into(electrons, means);
         }
         match &self.srgb {
-            Some(srgb) => srgb.render(means, out, |value| value),
+            Some(srgb) => render_means(srgb, means, out),
             None => interleave(means, out),
         }
     }
@@ -329,63 +329,93 @@ pub(crate) fn sum_over(runs: &[Run], tile: &[f32], width: usize, origin: [i64; 2
     sums.iter().sum()
 }
 
-/// Steps of the tone curve table: linear interpolation errs by less than a twentieth of an 8-bit grey level.
-const STEPS: usize = 4096;
-
 /// Conversion of balanced, linear grey levels of three channels to sRGB (primaries and tone curve of IEC 61966-2-1).
 struct Srgb {
+    /// Converts input grey levels to linear colours, 0 to 1.
     matrix: [[f32; 3]; 3],
-    /// Factor from input grey levels to 0..1.
-    input_scale: f32,
     largest: f32,
-    /// The curve at equal steps from 0 to 1, in grey levels; the last value is repeated.
-    curve: Vec<f32>,
 }
+
+/// Pixels that are converted in parallel.
+const LANES: usize = 16;
 
 impl Srgb {
     /// `matrix` converts the channels to linear sRGB; input has `inner_bits`, output has `bits`.
     fn new(matrix: &[[f64; 3]; 3], inner_bits: u32, bits: u32) -> Self {
-        let levels = |bits: u32| libm::exp2(f64::from(bits)) - 1.0;
-        let largest = levels(bits);
-        let curve =
-            (0..=STEPS + 1).map(|step| (largest * encoded((step as f64 / STEPS as f64).min(1.0))) as f32).collect();
-        Self {
-            matrix: matrix.map(|row| row.map(|v| v as f32)),
-            input_scale: (1.0 / levels(inner_bits)) as f32,
-            largest: largest as f32,
-            curve,
-        }
+        let largest = |bits: u32| libm::exp2(f64::from(bits)) - 1.0;
+        let scale = 1.0 / largest(inner_bits);
+        Self { matrix: matrix.map(|row| row.map(|v| (scale * v) as f32)), largest: largest(bits) as f32 }
     }
 
-    /// Writes interleaved colours.
-    fn render<T: Copy + Into<f32>, U>(&self, channels: &[Vec<T>], out: &mut [U], store: impl Fn(f32) -> U) {
+    /// Writes the colours of pixels, interleaved; `store` converts grey levels, 0 to the highest level.
+    #[inline(always)]
+    fn render<T: Copy + Default + Into<f32>, U: Copy>(
+        &self,
+        channels: &[Vec<T>],
+        out: &mut [U],
+        store: impl Fn(f32) -> U,
+    ) {
         let [r, g, b] = channels else { return };
-        for (((out, &r), &g), &b) in out.chunks_exact_mut(3).zip(r).zip(g).zip(b) {
-            for (out, value) in out.iter_mut().zip(self.convert([r.into(), g.into(), b.into()])) {
-                *out = store(value);
+        let ([r, g, b], colours) = ([r, g, b].map(|channel| channel.as_chunks()), out.as_chunks_mut::<{ 3 * LANES }>());
+        for (((r, g), b), out) in r.0.iter().zip(g.0).zip(b.0).zip(colours.0) {
+            self.convert([r, g, b], out, &store);
+        }
+        let (rest, mut last) = (colours.1, [store(0.0); 3 * LANES]);
+        let ends = [r.1, g.1, b.1].map(|end| {
+            let mut block = [T::default(); LANES];
+            block[..end.len()].copy_from_slice(end);
+            block
+        });
+        self.convert(ends.each_ref(), &mut last, &store);
+        rest.copy_from_slice(&last[..rest.len()]);
+    }
+
+    /// Writes the colours of a block of pixels.
+    #[inline(always)]
+    fn convert<T: Copy + Into<f32>, U>(
+        &self,
+        channels: [&[T; LANES]; 3],
+        out: &mut [U; 3 * LANES],
+        store: &impl Fn(f32) -> U,
+    ) {
+        let levels = channels.map(|channel| channel.map(Into::into));
+        for (c, row) in self.matrix.iter().enumerate() {
+            let mut colours = [0.0; LANES];
+            for (i, colour) in colours.iter_mut().enumerate() {
+                let linear = row[0] * levels[0][i] + row[1] * levels[1][i] + row[2] * levels[2][i];
+                *colour = self.largest * encoded(linear.clamp(0.0, 1.0));
+            }
+            for (out, colour) in out[c..].iter_mut().step_by(3).zip(colours) {
+                *out = store(colour);
             }
         }
     }
-
-    /// Converts one pixel to grey levels, clamped to 0 and the highest level.
-    #[inline(always)]
-    fn convert(&self, levels: [f32; 3]) -> [f32; 3] {
-        let mut colours = [0.0; 3];
-        // A loop: the closure of `map` may become a function.
-        for (colour, row) in colours.iter_mut().zip(&self.matrix) {
-            let linear = self.input_scale * (row[0] * levels[0] + row[1] * levels[1] + row[2] * levels[2]);
-            let at = linear.clamp(0.0, 1.0) * STEPS as f32;
-            let step = at as usize;
-            let (low, high) = (self.curve[step], self.curve[step + 1]);
-            *colour = low + (at - step as f32) * (high - low);
-        }
-        colours
-    }
 }
 
-/// Returns the sRGB tone curve, 0 to 1.
-fn encoded(linear: f64) -> f64 {
-    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * libm::pow(linear, 1.0 / 2.4) - 0.055 }
+/// Writes colours without noise, interleaved.
+#[multiversion(targets = "simd")]
+fn render_means(srgb: &Srgb, channels: &[Vec<f32>], out: &mut [f32]) {
+    srgb.render(channels, out, |value| value);
+}
+
+/// Writes colours as whole grey levels, interleaved.
+#[multiversion(targets = "simd")]
+fn render_levels(srgb: &Srgb, channels: &[Vec<u16>], out: &mut [u16]) {
+    /// Adding 2²³ to a smaller number rounds it to an integer, which the lowest bits then hold.
+    const UNIT: f32 = 8_388_608.0;
+    srgb.render(channels, out, |value| (value + UNIT).to_bits() as u16);
+}
+
+/// Returns the sRGB tone curve from 0 to 1, with an error below 2e-6.
+#[inline(always)]
+fn encoded(linear: f32) -> f32 {
+    /// Minimax polynomial of s^(5/3) above the straight part of the curve.
+    const POWER: [f32; 7] =
+        [-0.004_309_593_5, 0.132_326_34, 1.294_711_2, -0.808_488_66, 0.622_924_86, -0.301_814_45, 0.064_651_66];
+    // x^(1/2.4) = (x^¼)^(5/3)
+    let root = linear.sqrt().sqrt();
+    let power = POWER.iter().rev().fold(0.0, |sum, coefficient| sum * root + coefficient);
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * power - 0.055 }
 }
 
 #[cfg(test)]
@@ -406,5 +436,35 @@ mod tests {
         let fast = sum_over(&runs, &tile, 40, [20, 10]);
         assert!((fast - slow).abs() < 1e-9 * slow, "{fast} {slow}");
         assert_eq!(sum_over(&[], &tile, 40, [20, 10]), 0.0);
+    }
+
+    #[test]
+    fn colours_match_the_standard() {
+        let colour = colour(3200.0, Mixing::Spectral).unwrap();
+        for (matrix, bits) in [(colour.to_srgb(), 8), (&UNCHANGED, 12), (&UNCHANGED, 16)] {
+            let srgb = Srgb::new(matrix, 16, bits);
+            let highest = libm::exp2(f64::from(bits)) - 1.0;
+            for pixels in [1, LANES, 5 * LANES + 3, 70_000] {
+                let level = |i: usize, channel: usize| (i * [1, 7, 11][channel] + 300 * channel) as u16;
+                let levels = [0, 1, 2].map(|channel| (0..pixels).map(|i| level(i, channel)).collect::<Vec<_>>());
+                let means = levels.each_ref().map(|levels| levels.iter().map(|&level| f32::from(level)).collect());
+                let (mut grey, mut mean) = (vec![7; 3 * pixels], vec![7.0; 3 * pixels]);
+                render_levels(&srgb, &levels, &mut grey);
+                render_means(&srgb, &means, &mut mean);
+                for (i, (grey, mean)) in grey.iter().zip(&mean).enumerate() {
+                    let channels = [0, 1, 2].map(|channel| f64::from(level(i / 3, channel)) / 65_535.0);
+                    let linear: f64 = matrix[i % 3].iter().zip(channels).map(|(m, v)| m * v).sum();
+                    let linear = linear.clamp(0.0, 1.0);
+                    let exact = highest
+                        * if linear <= 0.003_130_8 {
+                            12.92 * linear
+                        } else {
+                            1.055 * libm::pow(linear, 1.0 / 2.4) - 0.055
+                        };
+                    assert!((f64::from(*mean) - exact).abs() < 3e-6 * highest, "{bits} {i}: {mean} {exact}");
+                    assert!((f64::from(*grey) - exact).abs() < 0.5 + 3e-6 * highest, "{bits} {i}: {grey} {exact}");
+                }
+            }
+        }
     }
 }

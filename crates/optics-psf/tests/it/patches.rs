@@ -513,6 +513,12 @@ fn light_outside_the_image_is_ignored() {
     light.clear();
     light.image_into(&mut out);
     assert_eq!(out, vec![1.0; 64 * 64]);
+    light.multiply(&speck, [30, 30]);
+    light.image_into(&mut out);
+    let mut swapped = Vec::new();
+    light.swap_image(&mut swapped);
+    assert_eq!(out, swapped);
+    assert!(out.iter().any(|light| *light < 1.0));
     TransmittedLight::new(imager.microscope(), 0, 0).image_into(&mut []);
 }
 

@@ -104,11 +104,15 @@ impl BrightFieldPath {
         light: &mut LightBuffers,
     ) -> Result<TransmissionStats, ErrorKind> {
         let View { width, height, .. } = specimen.scene.view;
-        let LightBuffers { channels, lights, images, patches, .. } = light;
+        let LightBuffers { channels, lights, images: light_images, patches, .. } = light;
+        let is_sum = self.groups.len() > 1;
+        if is_sum {
+            channels.iter_mut().for_each(|channel| clear(channel, width * height));
+        }
         let mut stats = TransmissionStats { absorbances: vec![Vec::new(); channels.len()], clipped_px: 0 };
         for group in &self.groups {
             lights.resize_with(group.lights.len(), optics_psf::TransmittedLight::default);
-            images.resize(group.lights.len(), Vec::new());
+            light_images.resize(if is_sum { group.lights.len() } else { 0 }, Vec::new());
             for (light, of) in lights.iter_mut().zip(&group.lights) {
                 light.reset(of.imager.microscope(), width, height);
             }
@@ -127,22 +131,20 @@ impl BrightFieldPath {
                     light.multiply(&image?, [0, 0]);
                 }
             }
-            if matches!(specimen.scene.light, SceneLight::Monochrome { .. }) {
-                lights.iter().zip(&mut *channels).for_each(|(light, channel)| light.image_into(channel));
-                stats.absorbances = absorbances;
-                continue;
-            }
-            for (light, image) in lights.iter().zip(images.iter_mut()) {
-                image.resize(width * height, 0.0);
-                light.image_into(image);
+            // A light that is the only one of its channel is written to it.
+            let images = if is_sum { &mut *light_images } else { &mut *channels };
+            for (light, image) in lights.iter_mut().zip(images.iter_mut()) {
+                light.swap_image(image);
             }
             if let (false, Some(overlaps), DyeMixer::Colour(colour)) = (exact, &self.overlaps, &group.mixer) {
                 let blur_px = |index: usize| self.blur_px(specimen, index, focus, group);
                 overlaps.correct(colour, specimen, blur_px, images)?;
             }
-            for ((of, image), absorbances) in group.lights.iter().zip(&*images).zip(&absorbances) {
+            for (light, (of, absorbances)) in group.lights.iter().zip(&absorbances).enumerate() {
                 for (channel, &weight) in of.weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
-                    add_light(&mut channels[channel], image, weight as f32);
+                    if is_sum {
+                        add_light(&mut channels[channel], &light_images[light], weight as f32);
+                    }
                     let sums = &mut stats.absorbances[channel];
                     sums.resize(absorbances.len(), 0.0);
                     sums.iter_mut().zip(absorbances).for_each(|(sum, value)| *sum += weight * value);

@@ -6,7 +6,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use optics_psf::{Gaussian, Method, Scratch};
 
 use super::light::{FocusAt, LightBuffers, Specimen, TransmissionStats};
-use super::object_transmission::{Window, add, blurred_tile};
+use super::object_transmission::{Window, add, blurred_tile, clear};
 use crate::detect::sum_over;
 use crate::error::ErrorKind;
 use crate::phantom::piece::Piece;
@@ -72,6 +72,7 @@ impl GaussianPath {
         focus: FocusAt,
         light: &mut LightBuffers,
     ) -> Result<TransmissionStats, ErrorKind> {
+        clear(&mut light.channels[0], self.frame.width * self.frame.height);
         let mut absorbances = Vec::new();
         let blur = |index: usize| {
             let defocus_um = match focus {

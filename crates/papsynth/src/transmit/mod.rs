@@ -21,7 +21,6 @@ use bright_field::BrightFieldPath;
 pub(crate) use channel_lights::MicroscopeCache;
 use gaussian::GaussianPath;
 pub(crate) use light::{FocusAt, LightBuffers, Specimen, TransmissionStats};
-use object_transmission::clear;
 
 /// Rows per band: few enough that a band stays in the cache of one core between light and grey levels.
 pub(crate) const BAND_ROWS: usize = 32;
@@ -60,8 +59,6 @@ impl LightPath {
         focus: FocusAt,
         light: &mut LightBuffers,
     ) -> Result<TransmissionStats, ErrorKind> {
-        let View { width, height, .. } = specimen.scene.view;
-        light.channels.iter_mut().for_each(|channel| clear(channel, width * height));
         match self {
             Self::Gaussian(path) => path.transmit(specimen, focus, light),
             Self::BrightField(path) => path.transmit(specimen, focus, light),

@@ -3,7 +3,7 @@
 use core::cmp::Ordering;
 use std::borrow::Cow;
 
-use dye_spectra::{Amounts, Colour, DYES};
+use dye_spectra::{Amounts, Colour, Curve, DYES};
 use multiversion::multiversion;
 use optics_psf::{Gaussian, Scratch};
 use portable_numerics::elementary::exp10_from;
@@ -35,7 +35,18 @@ pub(super) struct ObjectTransmission {
     buffers: MixerBuffers,
 }
 
-/// The absorbance at one wavelength as a negative number, or the amounts of dyes; empty planes stand for zero.
+/// The conversion of the absorbance of some pieces to transmittance.
+enum Mixture<'a> {
+    /// At one wavelength, µm.
+    Wavelength(f64),
+    /// All pieces have the same dyes: one number per sample is sufficient.
+    Proportional(Box<Curve>),
+    /// Any amounts of dyes.
+    Dyes(&'a Colour),
+}
+
+/// The absorbance at one wavelength as a negative number, the total amount of dye, or the amount of each dye; empty
+/// planes stand for zero.
 type AmountPlanes = [Vec<f32>; DYES];
 
 /// Working memory of [`DyeMixer`].
@@ -46,10 +57,11 @@ struct MixerBuffers {
     steep: SteepSamples,
 }
 
-/// Samples within which amounts vary.
+/// Blocks of samples within which amounts vary.
 #[derive(Debug, Default)]
 struct SteepSamples {
-    places: Vec<u32>,
+    /// First sample of each block.
+    blocks: Vec<usize>,
     /// Amounts above the mean of all samples, then those below.
     amounts: AmountPlanes,
     transmittance: Vec<Vec<f32>>,
@@ -216,16 +228,15 @@ impl DyeMixer {
             ((piece, Cow::Owned(mean)), (piece, Cow::Owned(deviation)))
         });
         let (means, of_deviations): (Vec<_>, Vec<_>) = moments.unzip();
-        self.transmittance(&means, window, &mut layer.transmittance, amounts);
-        self.amounts(&of_deviations, window, deviations);
+        let mixture = self.mixture(own());
+        mixture.amounts(&means, window, amounts);
+        mixture.transmit(amounts, window.width * window.height, &mut layer.transmittance);
+        mixture.amounts(&of_deviations, window, deviations);
         // T(A) is not linear: the mean of its values at the mean ± the deviation of A approximates that of a sample.
         steep.find(amounts, deviations);
-        self.transmit(&steep.amounts, 2 * steep.places.len(), &mut steep.transmittance);
+        mixture.transmit(&steep.amounts, steep.len(), &mut steep.transmittance);
         for (transmittance, found) in layer.transmittance.iter_mut().zip(&steep.transmittance) {
-            let (above, below) = found.split_at(steep.places.len());
-            for ((place, above), below) in steep.places.iter().zip(above).zip(below) {
-                transmittance[*place as usize] = 0.5 * (above + below);
-            }
+            steep.replace(transmittance, found);
         }
         means
     }
@@ -238,54 +249,19 @@ impl DyeMixer {
         transmittance: &mut Vec<Vec<f32>>,
         amounts: &mut AmountPlanes,
     ) {
-        self.amounts(tiles, window, amounts);
-        self.transmit(amounts, window.width * window.height, transmittance);
+        let mixture = self.mixture(tiles.iter().map(|(piece, _)| *piece));
+        mixture.amounts(tiles, window, amounts);
+        mixture.transmit(amounts, window.width * window.height, transmittance);
     }
 
-    /// Adds the amounts of tiles of the same sampling.
-    fn amounts(&self, tiles: &[(&Piece, Cow<'_, Tile>)], window: Window, amounts: &mut AmountPlanes) {
-        let samples = window.width * window.height;
+    /// Returns how the absorbance of these pieces becomes transmittance.
+    fn mixture<'p>(&self, mut pieces: impl Iterator<Item = &'p Piece>) -> Mixture<'_> {
         match self {
-            Self::Monochrome(wavelength) => {
-                let [absorbance, ..] = amounts;
-                clear(absorbance, samples);
-                for (piece, tile) in tiles {
-                    let strength = dye_spectra::absorbance(&piece.dyes, *wavelength) as f32;
-                    add(absorbance, window, tile, -strength);
-                }
-            }
-            Self::Colour(_) => {
-                for (dye, amount) in amounts.iter_mut().enumerate() {
-                    amount.clear();
-                    // A dye without amounts needs no plane.
-                    if tiles.iter().any(|(piece, _)| piece.dyes[dye] > 0.0) {
-                        amount.resize(samples, 0.0);
-                    }
-                    for (piece, tile) in tiles.iter().filter(|(piece, _)| piece.dyes[dye] > 0.0) {
-                        add(amount, window, tile, piece.dyes[dye] as f32);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Computes the transmittance of amounts in each channel.
-    fn transmit(&self, amounts: &AmountPlanes, samples: usize, transmittance: &mut Vec<Vec<f32>>) {
-        transmittance.resize(self.channels(), Vec::new());
-        match self {
-            // Beer and Lambert: T = 10^(−A).
-            Self::Monochrome(_) => {
-                let [transmittance] = &mut transmittance[..] else { return };
-                clear(transmittance, samples);
-                exp10_from(&amounts[0], transmittance);
-            }
+            Self::Monochrome(wavelength) => Mixture::Wavelength(*wavelength),
             Self::Colour(colour) => {
-                for channel in transmittance.iter_mut() {
-                    channel.resize(samples, 0.0);
-                }
-                let [r, g, b] = &mut transmittance[..] else { return };
-                let [h, e, l, o, n] = amounts;
-                colour.transmittance_into([h, e, l, o, n], [r, g, b]);
+                let dyes = pieces.next().map(|first| first.dyes).filter(|dyes| pieces.all(|piece| piece.dyes == *dyes));
+                let curve = dyes.and_then(|dyes| colour.curve(&proportions(&dyes)).ok());
+                curve.map_or(Mixture::Dyes(colour), |curve| Mixture::Proportional(Box::new(curve)))
             }
         }
     }
@@ -303,40 +279,134 @@ impl DyeMixer {
     }
 }
 
-impl SteepSamples {
-    /// Finds the samples in which the sum of deviations is large, and collects their amounts.
-    fn find(&mut self, amounts: &AmountPlanes, deviations: &AmountPlanes) {
-        let Self { places, amounts: own, .. } = self;
-        places.clear();
-        let samples = deviations.iter().map(Vec::len).max().unwrap_or(0);
-        let planes: Vec<&[f32]> = deviations.iter().filter(|plane| !plane.is_empty()).map(Vec::as_slice).collect();
-        for first in (0..samples).step_by(BLOCK) {
-            let mut sums = [0.0_f32; BLOCK];
-            for plane in &planes {
-                sums.iter_mut().zip(&plane[first..]).for_each(|(sum, deviation)| *sum += deviation.abs());
+/// Returns the sum of the amounts of all dyes.
+pub(super) fn total(dyes: &Amounts) -> f64 {
+    dyes.iter().sum()
+}
+
+/// Returns the amounts of dyes relative to their sum.
+pub(super) fn proportions(dyes: &Amounts) -> Amounts {
+    dyes.map(|amount| amount / total(dyes).max(f64::MIN_POSITIVE))
+}
+
+impl Mixture<'_> {
+    /// Adds the amounts of tiles of the same sampling.
+    fn amounts(&self, tiles: &[(&Piece, Cow<'_, Tile>)], window: Window, amounts: &mut AmountPlanes) {
+        for (number, amount) in amounts.iter_mut().enumerate() {
+            let strength = |piece: &Piece| match (self, number) {
+                (Self::Wavelength(wavelength), 0) => -dye_spectra::absorbance(&piece.dyes, *wavelength),
+                (Self::Proportional(_), 0) => total(&piece.dyes),
+                (Self::Wavelength(_) | Self::Proportional(_), _) => 0.0,
+                (Self::Dyes(_), dye) => piece.dyes[dye],
+            };
+            amount.clear();
+            // A dye without amounts needs no plane.
+            if number == 0 || tiles.iter().any(|(piece, _)| strength(piece) != 0.0) {
+                amount.resize(window.width * window.height, 0.0);
             }
-            if sums.iter().fold(false, |steep, sum| steep | (*sum > STEEP)) {
-                let steep = sums.iter().enumerate().filter(|(_, sum)| **sum > STEEP);
-                places.extend(steep.map(|(i, _)| (first + i) as u32));
+            for (piece, tile) in tiles.iter().filter(|(piece, _)| strength(piece) != 0.0) {
+                add(amount, window, tile, strength(piece) as f32);
             }
         }
+    }
+
+    /// Computes the transmittance of amounts in each channel.
+    fn transmit(&self, amounts: &AmountPlanes, samples: usize, transmittance: &mut Vec<Vec<f32>>) {
+        let channels = if matches!(self, Self::Wavelength(_)) { 1 } else { 3 };
+        transmittance.resize(channels, Vec::new());
+        transmittance.iter_mut().for_each(|channel| channel.resize(samples, 0.0));
+        match (self, &mut transmittance[..]) {
+            // Beer and Lambert: T = 10^(−A).
+            (Self::Wavelength(_), [transmittance]) => {
+                transmittance.fill(0.0);
+                exp10_from(&amounts[0], transmittance);
+            }
+            (Self::Proportional(curve), [r, g, b]) => curve.transmittance_into(&amounts[0], [r, g, b]),
+            (Self::Dyes(colour), [r, g, b]) => {
+                colour.transmittance_into(amounts.each_ref().map(|plane| &plane[..]), [r, g, b]);
+            }
+            _ => {}
+        }
+    }
+}
+
+impl SteepSamples {
+    /// Finds the blocks with a sample in which the sum of deviations is large, and collects their amounts.
+    fn find(&mut self, amounts: &AmountPlanes, deviations: &AmountPlanes) {
+        let Self { blocks, amounts: own, .. } = self;
+        find_steep(deviations, blocks);
         for ((own, amounts), deviations) in own.iter_mut().zip(amounts).zip(deviations) {
             own.clear();
-            if amounts.is_empty() || places.is_empty() {
+            if amounts.is_empty() {
                 continue;
             }
             for sign in [1.0, -1.0] {
-                own.extend(places.iter().map(|place| {
-                    let deviation = deviations.get(*place as usize).copied().unwrap_or(0.0);
-                    amounts[*place as usize] + sign * deviation
-                }));
+                for &first in &*blocks {
+                    let (at, amounts) = (own.len(), block_at(amounts, first));
+                    own.extend_from_slice(amounts);
+                    if !deviations.is_empty() {
+                        add_scaled(&mut own[at..], block_at(deviations, first), sign);
+                    }
+                }
             }
         }
+    }
+
+    /// Replaces the transmittance in the blocks by the mean above and below the mean amount.
+    fn replace(&self, transmittance: &mut [f32], found: &[f32]) {
+        let (mut above, mut below) = found.split_at(found.len() / 2);
+        for &first in &self.blocks {
+            let to = &mut transmittance[first..];
+            let length = to.len().min(BLOCK);
+            set_mean(&mut to[..length], &above[..length], &below[..length]);
+            (above, below) = (&above[length..], &below[length..]);
+        }
+    }
+
+    /// Returns the number of collected amounts.
+    fn len(&self) -> usize {
+        self.amounts[0].len()
     }
 }
 
 /// Samples that are compared together.
 const BLOCK: usize = 16;
+
+/// Returns the samples of a block; the last one may be shorter.
+fn block_at(plane: &[f32], first: usize) -> &[f32] {
+    &plane[first..plane.len().min(first + BLOCK)]
+}
+
+/// Writes the first sample of every block that contains a large sum of deviations.
+#[multiversion(targets = "simd")]
+fn find_steep(deviations: &AmountPlanes, blocks: &mut Vec<usize>) {
+    blocks.clear();
+    let samples = deviations.iter().map(Vec::len).max().unwrap_or(0);
+    for first in (0..samples).step_by(BLOCK) {
+        let mut sums = [0.0_f32; BLOCK];
+        for plane in deviations.iter().filter(|plane| !plane.is_empty()) {
+            let block = &plane[first..];
+            if let Some(block) = block.first_chunk::<BLOCK>() {
+                sums.iter_mut().zip(block).for_each(|(sum, deviation)| *sum += deviation.abs());
+            } else {
+                sums.iter_mut().zip(block).for_each(|(sum, deviation)| *sum += deviation.abs());
+            }
+        }
+        if sums.iter().fold(false, |steep, sum| steep | (*sum > STEEP)) {
+            blocks.push(first);
+        }
+    }
+}
+
+#[multiversion(targets = "simd")]
+fn set_mean(to: &mut [f32], above: &[f32], below: &[f32]) {
+    to.iter_mut().zip(above.iter().zip(below)).for_each(|(to, (above, below))| *to = 0.5 * (above + below));
+}
+
+#[multiversion(targets = "simd")]
+pub(super) fn add_scaled(values: &mut [f32], others: &[f32], factor: f32) {
+    values.iter_mut().zip(others).for_each(|(value, other)| *value += factor * other);
+}
 
 /// Returns the absorbance of a piece sampled at another distance, at least in a window.
 fn resampled(piece: &Piece, step: usize, window: Window) -> Cow<'_, Tile> {
