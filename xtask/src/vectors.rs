@@ -11,10 +11,10 @@ use crate::workspace::Workspace;
 /// Functions whose loops over lanes must not become gathers or scatters, which take several times as long.
 const HOT: [&str; 11] = [
     "ccd_noise::chain::expose_row::",
-    "optics_psf::canvas::add_columns::",
     "optics_psf::canvas::mean_over_pixels::",
     "optics_psf::canvas::squares_of::",
     "optics_psf::canvas::transmit::",
+    "optics_psf::canvas::write_columns::",
     "optics_psf::smooth::variances::",
     "optics_psf::spectrum::join::",
     "optics_psf::spectrum::place::",

@@ -26,7 +26,18 @@ pub(crate) struct Canvas {
     y: Vec<[f32; LANES]>,
     /// Transfer of the mean over the samples of a pixel along x and y.
     pixel: [PixelMean; 2],
-    is_pixel_mean: bool,
+    mean: Mean,
+}
+
+/// How the mean over the samples of a pixel is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Mean {
+    /// Each sample is that of a pixel.
+    None,
+    /// By the filter: one sample per pixel, at its centre, is the mean of several points.
+    Centred,
+    /// By a factor that moves the image from the first sample of a pixel to its centre.
+    Moved,
 }
 
 /// Transfer of the pixel mean at frequencies 0, 1, … of one axis.
@@ -153,7 +164,11 @@ impl Canvas {
             #[expect(clippy::cast_possible_truncation, reason = "tables use single precision")]
             step_x: steps[0] as f32,
             pixel: size.map(|side| PixelMean::new(side, samples, microscope.params().oversampling)),
-            is_pixel_mean: microscope.params().oversampling > 1,
+            mean: match (samples, microscope.params().oversampling) {
+                (_, 1) => Mean::None,
+                (1, _) => Mean::Centred,
+                _ => Mean::Moved,
+            },
         }
     }
 
@@ -219,29 +234,30 @@ impl Canvas {
         // Scales of the image, and of its spectrum at the object's number of samples.
         let (norm, scale) = (self.object.norm(), self.squares.norm() / self.object.norm());
         let blur = |block: usize, plus: &mut [Lanes], _: &mut [Lanes]| {
-            self.image(in_focus, of_amplitude, None, block, plus, &mut []);
+            self.image(in_focus, of_amplitude, None, (block, false), plus, &mut []);
         };
         self.squares.squared(&self.support, blur, [norm, scale], &mut spectra.correction, grid);
         for block in 0..self.support.blocks() {
             let range = self.support.range(block);
             blurred.resize(range.len(), ZERO);
-            self.image(in_focus, of_square, None, block, blurred, &mut []);
+            self.image(in_focus, of_square, None, (block, false), blurred, &mut []);
             subtract(&mut spectra.correction.plus[range], blurred);
         }
     }
 
-    /// Filters a block of a spectrum.
+    /// Filters a block of a spectrum, with or without the pixel mean.
     fn image(
         &self,
         filter: &Filter,
         light: &Spectrum,
         correction: Option<&Spectrum>,
-        block: usize,
+        (block, is_mean): (usize, bool),
         plus: &mut [Lanes],
         minus: &mut [Lanes],
     ) {
         let range = self.support.range(block);
         let at = Block {
+            is_mean,
             step_x: self.step_x,
             y: &self.y[block],
             pixel_x: &self.pixel[0].size,
@@ -273,8 +289,8 @@ impl Canvas {
         }
         let correction = (!correction.is_empty()).then_some(correction);
         let fill = |block: usize, plus: &mut [Lanes], minus: &mut [Lanes]| {
-            self.image(filter, light, correction, block, plus, minus);
-            if self.is_pixel_mean {
+            self.image(filter, light, correction, (block, self.mean == Mean::Centred), plus, minus);
+            if self.mean == Mean::Moved {
                 let [x, y] = &self.pixel;
                 let (x, y) = (&x.moved[..=self.support.reach(block)], &y.moved.as_chunks().0[block]);
                 mean_over_pixels::<false>(plus, x, y);
@@ -304,22 +320,40 @@ impl ImageStripe<'_> {
     /// stripe is added to the first row of the images, and its column 0 to column `at`. Columns from `end` on are left
     /// out.
     pub(crate) fn add_to(&self, absorbed: &mut [f32], phases: &mut [f32], width: usize, at: usize, end: usize) {
+        self.write_to::<false>(absorbed, phases, width, at, end);
+    }
+
+    /// As [`add_to`](Self::add_to), but replaces the images, which have the columns of the stripes.
+    pub(crate) fn store_in(&self, absorbed: &mut [f32], phases: &mut [f32], width: usize) {
+        self.write_to::<true>(absorbed, phases, width, 0, width);
+    }
+
+    fn write_to<const STORE: bool>(
+        &self,
+        absorbed: &mut [f32],
+        phases: &mut [f32],
+        width: usize,
+        at: usize,
+        end: usize,
+    ) {
         let columns = |left: usize| (at + left).min(end)..(at + left + LANES).min(end);
+        let (first, second) = (columns(self.left), columns(self.left + LANES));
         match self.pixels {
             Pixels::Complex => {
-                add_columns(absorbed, width, columns(self.left), self.rows, 1, self.norm);
-                add_columns(phases, width, columns(self.left), self.rows, 0, self.norm);
+                write_columns::<STORE>(absorbed, width, first.clone(), self.rows, 1, self.norm);
+                write_columns::<STORE>(phases, width, first, self.rows, 0, self.norm);
             }
             Pixels::Real => {
-                add_columns(absorbed, width, columns(self.left), self.rows, 1, self.norm);
-                add_columns(absorbed, width, columns(self.left + LANES), self.rows, 0, self.norm);
+                write_columns::<STORE>(absorbed, width, first, self.rows, 1, self.norm);
+                write_columns::<STORE>(absorbed, width, second, self.rows, 0, self.norm);
             }
         }
     }
 }
 
+/// Writes a part of a stripe, times a factor, to columns of an image, or adds it.
 #[multiversion(targets = "simd")]
-fn add_columns(
+fn write_columns<const STORE: bool>(
     image: &mut [f32],
     width: usize,
     columns: core::ops::Range<usize>,
@@ -327,13 +361,14 @@ fn add_columns(
     part: usize,
     norm: f32,
 ) {
+    let write = |image: &mut f32, value: &f32| *image = if STORE { norm * value } else { *image + norm * value };
     for (image, row) in image.chunks_exact_mut(width).zip(rows) {
         let image = &mut image[columns.clone()];
         // Full stripes have a length known at compile time.
         if let Some(image) = image.first_chunk_mut::<LANES>() {
-            image.iter_mut().zip(&row[part]).for_each(|(image, value)| *image += norm * value);
+            image.iter_mut().zip(&row[part]).for_each(|(image, value)| write(image, value));
         } else {
-            image.iter_mut().zip(&row[part]).for_each(|(image, value)| *image += norm * value);
+            image.iter_mut().zip(&row[part]).for_each(|(image, value)| write(image, value));
         }
     }
 }

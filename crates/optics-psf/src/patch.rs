@@ -10,6 +10,7 @@ use crate::grid::fast_length;
 use crate::microscope::distance;
 use crate::smooth::{SmoothCorrection, is_detailed};
 use crate::spectrum::LanePlans;
+use crate::transfer::FAR_UM;
 use crate::{Error, Microscope, Transfer};
 
 /// Renders a slide patch by patch: each patch is at one depth and gives a transmission factor of the light around it.
@@ -105,6 +106,12 @@ struct LoadedLayer {
     fresh: usize,
 }
 
+impl LoadedLayer {
+    fn size_px(&self) -> [usize; 2] {
+        [self.width, self.absorbed.len() / self.width].map(|side| side / self.samples_per_pixel)
+    }
+}
+
 /// How the in-focus correction of a layer is computed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 enum Correction {
@@ -131,6 +138,7 @@ pub struct PatchScratch {
     canvas: CanvasScratch,
     phases: Vec<f32>,
     absorbed: Vec<f32>,
+    spectra: Spectra,
 }
 
 /// Transmission factor of a patch: light relative to an empty slide, as the mean over each camera pixel.
@@ -174,7 +182,7 @@ impl PatchImager {
 
     /// Computes the imaging properties at a depth and stage position: see [`Microscope::transfer`].
     ///
-    /// Up to 12 µm from the slide's focal plane, transfer functions are interpolated between a few depths, a third of a
+    /// Up to a defocus of 15 µm, transfer functions are interpolated between a few depths, a third of a
     /// µm apart. Each takes about 0.1 ms and is cached per stage position; all else takes some 10 µs. The result does
     /// not depend on the state of the cache.
     ///
@@ -192,16 +200,13 @@ impl PatchImager {
         })
     }
 
-    /// As [`focus`](Self::focus), for an object whose transmittance was measured in an image in focus, which lens and
-    /// pixels have already blurred once. In focus the object keeps its appearance.
-    ///
-    /// # Errors
-    ///
-    /// See [`PatchImager::focus`].
-    pub fn refocus(&self, depth_um: f64, stage_um: f64) -> Result<Focus, Error> {
-        let mut focus = self.focus(depth_um, stage_um)?;
+    /// Returns a focus for an object whose transmittance was measured in an image in focus, which lens and pixels have
+    /// already blurred once. In focus the object keeps its appearance.
+    #[must_use]
+    pub fn refocus(&self, focus: &Focus) -> Focus {
+        let mut focus = focus.clone();
         Arc::make_mut(&mut focus.filter).restore(&self.in_focus);
-        Ok(focus)
+        focus
     }
 
     /// Returns the margin of a patch ([`Focus::margin_px`]) without computing a [`Focus`].
@@ -308,29 +313,39 @@ impl PatchImager {
         assert!(is_own, "the patch or the focus belongs to another imager");
         let margin_px = focus_of(0).margin_px;
         let [width, height] = patch.size_px.map(|side| side + 2 * margin_px);
-        let PatchScratch { canvas: scratch, phases, absorbed: corrected } = scratch;
+        let PatchScratch { canvas: scratch, phases, absorbed: corrected, spectra: spare } = scratch;
         *factor = Factor { width, values: core::mem::take(&mut factor.values), margin_px, clipped: 0 };
-        factor.values.clear();
-        factor.values.resize(width * height, 0.0);
-        phases.clear();
-        if patch.layers.iter().any(|layer| !layer.phase.is_empty()) {
-            phases.resize(width * height, 0.0);
+        // A first layer that covers the patch is stored, and later ones are added.
+        let is_stored = |layer: &LoadedLayer| !layer.is_empty && layer.size_px() == patch.size_px;
+        let stored = patch.layers.first().filter(|layer| is_stored(layer));
+        let has_phase = patch.layers.iter().any(|layer| !layer.phase.is_empty());
+        for (image, is_used, is_stored) in [
+            (&mut factor.values, true, stored.is_some()),
+            (&mut *phases, has_phase, stored.is_some_and(|layer| !layer.phase.is_empty())),
+        ] {
+            if !is_stored {
+                image.clear();
+            }
+            image.resize(if is_used { width * height } else { 0 }, 0.0);
         }
+        let is_first_stored = stored.is_some();
         for (index, layer) in patch.layers.iter_mut().enumerate().filter(|(_, layer)| !layer.is_empty) {
             let focus = focus_of(index);
             assert!(focus.margin_px == margin_px, "layers must have the same margin");
             let [x, y] = layer.at_px;
-            let columns = layer.width / layer.samples_per_pixel + 2 * margin_px;
-            let rows = layer.absorbed.len() / layer.width / layer.samples_per_pixel + 2 * margin_px;
+            let [columns, rows] = layer.size_px().map(|side| side + 2 * margin_px);
             let has_phase = !layer.phase.is_empty();
-            let (canvas, spectra) = self.padded_spectra(layer, focus, corrected, scratch);
+            let (canvas, spectra) = self.padded_spectra(layer, focus, (corrected, spare), scratch);
             let absorbed = &mut factor.values[y * width..(y + rows) * width];
             let phases = if has_phase { &mut phases[y * width..(y + rows) * width] } else { &mut [] };
             canvas.expose(
                 &focus.filter,
                 spectra,
                 columns,
-                |stripe| stripe.add_to(absorbed, phases, width, x, x + columns),
+                |stripe| match is_first_stored && index == 0 {
+                    true => stripe.store_in(absorbed, phases, width),
+                    false => stripe.add_to(absorbed, phases, width, x, x + columns),
+                },
                 scratch,
             );
         }
@@ -338,38 +353,49 @@ impl PatchImager {
     }
 
     /// Returns the layer's canvas and spectra with the margin of a focus, and computes what is missing.
+    ///
+    /// Where the correction fades out, its weight differs between planes, and `spare` receives the spectra.
     fn padded_spectra<'a>(
         &self,
         layer: &'a mut LoadedLayer,
         focus: &Focus,
-        corrected: &mut Vec<f32>,
+        (corrected, spare): (&mut Vec<f32>, &'a mut Spectra),
         scratch: &mut CanvasScratch,
     ) -> (Arc<Canvas>, &'a Spectra) {
-        let LoadedLayer { absorbed, behind, phase, width, samples_per_pixel, padded, fresh, .. } = layer;
-        let (width, n) = (*width, *samples_per_pixel);
-        let canvas = self.canvas([width / n, absorbed.len() / width / n], n, focus.margin_px);
-        let mut samples = Samples { absorbed, behind, phase, width, offset: focus.margin_px * n };
-        let cached = padded[..*fresh].iter().position(|entry| entry.margin_px == focus.margin_px);
-        let index = cached.unwrap_or(*fresh);
-        if index == padded.len() {
-            padded.push(PaddedSpectra::default());
-        }
-        let entry = &mut padded[index];
+        let (margin_px, size_px) = (focus.margin_px, layer.size_px());
+        let LoadedLayer { absorbed, behind, phase, width, samples_per_pixel: n, padded, fresh, .. } = layer;
+        let canvas = self.canvas(size_px, *n, margin_px);
+        let samples = Samples { absorbed, behind, phase, width: *width, offset: margin_px * *n };
         let added = if layer.correction == Correction::Added { focus.filter.correction } else { 0.0 };
-        if cached.is_none() || entry.added != added {
+        let mut load = |spectra: &mut Spectra| {
+            let mut samples = samples;
             if added > 0.0 {
                 corrected.resize(absorbed.len(), 0.0);
                 add_scaled(absorbed, &layer.variance, added, corrected);
                 samples.absorbed = corrected;
             }
-            canvas.load(samples, &mut entry.spectra, scratch);
-            (entry.margin_px, entry.added) = (focus.margin_px, added);
-            *fresh = (*fresh).max(index + 1);
+            canvas.load(samples, spectra, scratch);
+        };
+        if added > 0.0 && added < focus.filter.full_correction {
+            load(spare);
+            return (canvas, spare);
         }
+        let is_same = |entry: &PaddedSpectra| entry.margin_px == margin_px && entry.added == added;
+        let index = padded[..*fresh].iter().position(is_same).unwrap_or(*fresh);
+        if index == *fresh {
+            if index == padded.len() {
+                padded.push(PaddedSpectra::default());
+            }
+            let entry = &mut padded[index];
+            load(&mut entry.spectra);
+            (entry.margin_px, entry.added) = (margin_px, added);
+            *fresh += 1;
+        }
+        let spectra = &mut padded[index].spectra;
         if focus.filter.is_corrected() && layer.correction == Correction::Products {
-            canvas.correct(&self.in_focus, samples, &mut entry.spectra, scratch);
+            canvas.correct(&self.in_focus, samples, spectra, scratch);
         }
-        (canvas, &entry.spectra)
+        (canvas, spectra)
     }
 
     /// Returns the canvas for a size in pixels with its margin.
@@ -384,10 +410,9 @@ impl PatchImager {
 
 /// Transfer functions of any depth, interpolated between equidistant depths. They are computed on demand.
 ///
-/// Far from the specimen, objects are few and at different depths: their transfer functions are computed directly.
-///
 /// As a function of depth, a transfer function has no frequency above (n − √(n² − NA²))/λ. Sampled a few times per
-/// period, polynomial interpolation has an error below 0.001.
+/// period, polynomial interpolation has an error below 0.001. Far from the focal plane objects are few, and their
+/// transfer functions are computed without interpolation.
 #[derive(Debug)]
 struct TransferCache {
     microscope: Microscope,
@@ -402,9 +427,6 @@ const SAMPLES_PER_PERIOD: f64 = 4.6;
 /// Interpolation nodes on each side of a depth.
 const SIDE: i64 = 5;
 
-/// Depth in µm from which transfer functions are computed directly.
-const FAR_UM: f64 = 12.0;
-
 /// Largest number of cached table entries.
 const MOST_ENTRIES: usize = 1 << 20;
 
@@ -418,7 +440,7 @@ impl TransferCache {
 
     /// Returns the transfer function at a depth and stage position. The result does not depend on earlier calls.
     fn transfer(&self, depth_um: f64, stage_um: f64) -> Transfer {
-        if depth_um.abs() >= FAR_UM {
+        if self.microscope.defocus_um(depth_um, stage_um).abs() > FAR_UM {
             return Transfer::new(&self.microscope, depth_um, stage_um);
         }
         // Indices count away from the objective.
@@ -428,21 +450,28 @@ impl TransferCache {
         #[expect(clippy::cast_possible_truncation, reason = "depths are at most 1000 µm")]
         let below = below as i64;
         if t == 0.0 {
-            return (*self.samples(below..=below, stage_um)[0]).clone();
+            return Transfer::mixed(&self.samples(below..=below, stage_um, |_| 1.0));
         }
         // Lagrange polynomials.
-        let weight = |k: i64| {
+        let weight = |number: i64| {
+            let k = number - below;
             let others = (1 - SIDE..=SIDE).filter(|&j| j != k);
             others.map(|j| (t - j as f64) / (k - j) as f64).product::<f64>()
         };
-        let samples = self.samples(below + 1 - SIDE..=below + SIDE, stage_um);
-        Transfer::mixed(&samples.into_iter().zip((1 - SIDE..=SIDE).map(weight)).collect::<Vec<_>>())
+        Transfer::mixed(&self.samples(below + 1 - SIDE..=below + SIDE, stage_um, weight))
     }
 
-    fn samples(&self, numbers: RangeInclusive<i64>, stage_um: f64) -> Vec<Arc<Transfer>> {
+    /// Returns transfer functions by depth index, with their weights for [`Transfer::mixed`].
+    fn samples(
+        &self,
+        numbers: RangeInclusive<i64>,
+        stage_um: f64,
+        weight: impl Fn(i64) -> f64,
+    ) -> Vec<(Arc<Transfer>, [f32; 2])> {
         // The map stays valid if a thread panics.
         let lock = || self.cached.lock().unwrap_or_else(PoisonError::into_inner);
-        // Without aberrations, the wavefront changes its sign with depth and stage position.
+        // Without aberrations, the wavefront changes its sign with depth and stage position, and the effect of phase
+        // delay with it.
         let is_mirrored = |number: i64| {
             let is_below = stage_um < 0.0 || (stage_um == 0.0 && number < 0);
             is_below && self.microscope.is_mirrored()
@@ -465,7 +494,9 @@ impl TransferCache {
                 }
                 Arc::clone(cached.entry(key(number)).or_insert(transfer))
             });
-            if is_mirrored(number) { Arc::new(transfer.mirrored()) } else { transfer }
+            #[expect(clippy::cast_possible_truncation, reason = "tables use single precision")]
+            let weight = weight(number) as f32;
+            (transfer, [weight, if is_mirrored(number) { -weight } else { weight }])
         };
         numbers.zip(cached).map(make).collect()
     }
@@ -490,7 +521,7 @@ mod tests {
         for params in cases {
             let microscope = Microscope::new(&params).unwrap();
             let transfers = TransferCache::new(&microscope);
-            let depths: &[f64] = if params.zernike == coma { &[0.3] } else { &[0.0, 0.3, -1.1, 2.6, 5.2, -9.3] };
+            let depths: &[f64] = if params.zernike == coma { &[0.3] } else { &[0.0, 0.3, -1.1, 2.6, 5.2, -9.3, 30.0] };
             for &depth in depths {
                 for stage in [0.0, 2.0, -2.0] {
                     let (found, exact) = (transfers.transfer(depth, stage), Transfer::new(&microscope, depth, stage));
@@ -507,6 +538,42 @@ mod tests {
     }
 
     #[test]
+    fn planes_that_share_spectra_have_the_images_of_single_planes() {
+        let imager = PatchImager::new(&Microscope::new(&MicroscopeParams::default()).unwrap());
+        let (width, height) = (60, 50);
+        let sample = |i: usize| {
+            let [x, y] = [(i % width) as f32 - 30.0, (i / width) as f32 - 25.0];
+            let r2 = x * x + y * y;
+            0.6 / (1.0 + 1e-5 * r2 * r2 * r2)
+        };
+        let transmittance: Vec<f32> = (0..width * height).map(|i| 1.0 - sample(i)).collect();
+        let phase: Vec<f32> = (0..width * height).map(|i| 3.0 * sample(i)).collect();
+        let layer = PatchLayer {
+            transmittance: &transmittance,
+            phase_rad: &phase,
+            width,
+            samples_per_pixel: 1,
+            ..PatchLayer::default()
+        };
+        let (mut shared, mut scratch) = (Patch::default(), PatchScratch::default());
+        imager.load_layers([width, height], &[layer], &mut shared);
+        let (mut found, mut expected) = (Factor::default(), Factor::default());
+        for depth in [-7.0, -1.7, -1.2, -0.4, 0.0, 0.9, 1.4, 2.2, 5.0] {
+            let focus = imager.focus(depth, 0.0).unwrap();
+            let mut alone = Patch::default();
+            imager.load_layers([width, height], &[layer], &mut alone);
+            imager.expose(&mut shared, &focus, &mut scratch, &mut found);
+            imager.expose(&mut alone, &focus, &mut scratch, &mut expected);
+            assert_eq!(found, expected, "{depth}");
+        }
+        // Margins, and one of them with and without correction.
+        let entries = shared.layers[0].padded.iter().map(|entry| (entry.margin_px, entry.added > 0.0));
+        let entries: std::collections::BTreeSet<_> = entries.collect();
+        assert_eq!(entries.len(), shared.layers[0].padded.len());
+        assert!(entries.len() > 3 && entries.iter().any(|(_, is_corrected)| *is_corrected));
+    }
+
+    #[test]
     fn transfer_functions_do_not_depend_on_earlier_calls() {
         let fresh = || TransferCache::new(&Microscope::new(&MicroscopeParams::default()).unwrap());
         let transfers = fresh();
@@ -518,7 +585,7 @@ mod tests {
     #[test]
     fn transfer_functions_of_far_objects_are_exact() {
         let transfers = TransferCache::new(&Microscope::new(&MicroscopeParams::default()).unwrap());
-        for (depth, stage) in [(FAR_UM, 0.0), (-31.7, 0.5)] {
+        for (depth, stage) in [(FAR_UM + 5.0, 0.0), (-31.7, 0.5)] {
             assert_eq!(transfers.transfer(depth, stage), Transfer::new(&transfers.microscope, depth, stage));
         }
         assert!(transfers.cached.lock().unwrap().is_empty());

@@ -352,22 +352,36 @@ fn store([re, im]: [[[f32; LANES]; LANES]; 2], to: &mut [Lanes]) {
     }
 }
 
-/// Adds a block of a spectrum, kx from −r to r or reversed, to its positions in a line of zeros, with real and
-/// imaginary parts exchanged.
+/// Writes a block of a spectrum, kx from −r to r or reversed, to its positions in a line, with real and imaginary parts
+/// exchanged. The rest of the line becomes zero, and frequencies at the same position are added.
 #[multiversion(targets = "simd")]
 fn place(block: &[Lanes], is_reversed: bool, line: &mut [Lanes]) {
     let (width, reach) = (line.len(), block.len() / 2);
+    if block.len() <= width {
+        let (upper, rest) = line.split_at_mut(reach + 1);
+        let (zeros, lower) = rest.split_at_mut(width - block.len());
+        zeros.fill(ZERO);
+        if is_reversed {
+            upper.iter_mut().zip(block[..=reach].iter().rev()).for_each(|(to, from)| *to = exchanged(from));
+            lower.iter_mut().zip(block[reach + 1..].iter().rev()).for_each(|(to, from)| *to = exchanged(from));
+        } else {
+            upper.iter_mut().zip(&block[reach..]).for_each(|(to, from)| *to = exchanged(from));
+            lower.iter_mut().zip(&block[..reach]).for_each(|(to, from)| *to = exchanged(from));
+        }
+        return;
+    }
     line.fill(ZERO);
     let mut at = (width - reach % width) % width;
     for i in 0..block.len() {
         let from = &block[if is_reversed { block.len() - 1 - i } else { i }];
-        let to = &mut line[at];
-        for l in 0..LANES {
-            to[0][l] += from[1][l];
-            to[1][l] += from[0][l];
-        }
+        add(&mut line[at], &exchanged(from));
         at = if at + 1 == width { 0 } else { at + 1 };
     }
+}
+
+#[inline(always)]
+fn exchanged([re, im]: &Lanes) -> Lanes {
+    [*im, *re]
 }
 
 /// Collects the spectra along y of a stripe. The inverse of [`split`]; real and imaginary parts are exchanged.

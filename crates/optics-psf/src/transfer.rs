@@ -29,8 +29,26 @@ const DIRECTIONS: usize = 64;
 pub struct Transfer {
     /// Frequency step of the table, in cycles/µm.
     pub(crate) step: f64,
-    /// (H_A, H_P), complex, at multiples of the step: one row, or one row per direction.
-    pub(crate) table: Vec<[[f64; 2]; 2]>,
+    pub(crate) table: TransferTable,
+}
+
+/// (H_A, H_P) at multiples of a frequency step.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum TransferTable {
+    /// Real values of a round pupil.
+    Round(Vec<[f32; 2]>),
+    /// Complex values, one row per direction.
+    Sided(Vec<[[f32; 2]; 2]>),
+}
+
+impl TransferTable {
+    /// Returns the number of frequencies.
+    pub(crate) fn len(&self) -> usize {
+        match self {
+            Self::Round(table) => table.len(),
+            Self::Sided(table) => table.len(),
+        }
+    }
 }
 
 impl Microscope {
@@ -50,6 +68,7 @@ impl Microscope {
 }
 
 impl Transfer {
+    #[expect(clippy::cast_possible_truncation, reason = "tables use single precision")]
     pub(crate) fn new(microscope: &Microscope, depth_um: f64, stage_um: f64) -> Self {
         let step = Self::step_of(microscope);
         let pupil = |wavelength| Pupil::new(microscope.params(), wavelength, depth_um, stage_um);
@@ -68,37 +87,42 @@ impl Transfer {
         };
         if microscope.params().zernike.is_round() {
             let row = row([1.0, 0.0], SAMPLES).into_iter();
-            return Self { step, table: row.map(|[a, p]| [[a, 0.0], [p, 0.0]]).collect() };
+            return Self {
+                step,
+                table: TransferTable::Round(row.map(|pair| pair.map(|value| value as f32)).collect()),
+            };
         }
         let rows: Vec<Vec<[f64; 2]>> = (0..DIRECTIONS).map(|k| row(direction(k), ASYMMETRIC_SAMPLES)).collect();
         // H_A = (E(f) + E*(−f))/2, H_P = (E(f) − E*(−f))/2i
         let pair = |k: usize, i: usize| {
             let ([a, b], [c, d]) = (rows[k][i], rows[(k + DIRECTIONS / 2) % DIRECTIONS][i]);
-            [[0.5 * (a + c), 0.5 * (b - d)], [0.5 * (b + d), 0.5 * (c - a)]]
+            let pair = [[0.5 * (a + c), 0.5 * (b - d)], [0.5 * (b + d), 0.5 * (c - a)]];
+            pair.map(|complex| complex.map(|part| part as f32))
         };
         let table = (0..DIRECTIONS).flat_map(|k| (0..ASYMMETRIC_SAMPLES).map(move |i| (k, i))).map(|(k, i)| pair(k, i));
-        Self { step, table: table.collect() }
+        Self { step, table: TransferTable::Sided(table.collect()) }
     }
 
-    /// Returns the weighted sum of transfer functions of one microscope.
-    pub(crate) fn mixed(parts: &[(Arc<Self>, f64)]) -> Self {
-        let mut table = vec![[[0.0; 2]; 2]; parts[0].0.table.len()];
-        for (part, weight) in parts {
-            let sums = table.as_flattened_mut().as_flattened_mut();
-            add_scaled(sums, part.table.as_flattened().as_flattened(), *weight);
+    /// Returns a weighted sum of transfer functions of one microscope. Each has one weight for H_A and one for H_P.
+    pub(crate) fn mixed(parts: &[(Arc<Self>, [f32; 2])]) -> Self {
+        let (first, _) = &parts[0];
+        let mut table = match &first.table {
+            TransferTable::Round(table) => TransferTable::Round(vec![[0.0; 2]; table.len()]),
+            TransferTable::Sided(table) => TransferTable::Sided(vec![[[0.0; 2]; 2]; table.len()]),
+        };
+        for (part, [a, p]) in parts {
+            match (&mut table, &part.table) {
+                (TransferTable::Round(sums), TransferTable::Round(values)) => {
+                    add_scaled(sums.as_flattened_mut(), values.as_flattened(), &[*a, *p]);
+                }
+                (TransferTable::Sided(sums), TransferTable::Sided(values)) => {
+                    let (sums, values) = (sums.as_flattened_mut(), values.as_flattened());
+                    add_scaled(sums.as_flattened_mut(), values.as_flattened(), &[*a, *a, *p, *p]);
+                }
+                _ => unreachable!("transfer functions of one microscope have the same shape"),
+            }
         }
-        Self { step: parts[0].0.step, table }
-    }
-
-    /// Returns the transfer functions of the opposite wavefront error: the effect of phase delay changes its sign.
-    pub(crate) fn mirrored(&self) -> Self {
-        let table = self.table.iter().map(|&[absorption, phase]| [absorption, phase.map(|part| -part)]);
-        Self { step: self.step, table: table.collect() }
-    }
-
-    /// Returns whether the table has a single row.
-    pub(crate) fn is_round(&self) -> bool {
-        self.table.len() == SAMPLES
+        Self { step: first.step, table }
     }
 
     /// Returns the frequency step of a microscope's tables, in cycles/µm.
@@ -123,37 +147,46 @@ impl Transfer {
 
     /// Returns H_A and H_P.
     fn at(&self, [x, y]: [f64; 2]) -> [[f64; 2]; 2] {
-        let table = &self.table;
-        if self.is_round() {
-            let position = (x * x + y * y).sqrt() / self.step;
-            if position >= (SAMPLES - 1) as f64 {
-                return [[0.0; 2]; 2];
+        match &self.table {
+            TransferTable::Round(table) => {
+                let position = (x * x + y * y).sqrt() / self.step;
+                if position >= (SAMPLES - 1) as f64 {
+                    return [[0.0; 2]; 2];
+                }
+                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to the last entry")]
+                let i = position as usize;
+                let t = position - i as f64;
+                let value = |i: usize, k: usize| f64::from(table[i][k]);
+                [0, 1].map(|k| [value(i, k) + t * (value(i + 1, k) - value(i, k)), 0.0])
             }
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to the last entry")]
-            let i = position as usize;
-            let t = position - i as f64;
-            return [0, 1].map(|k| [table[i][k][0] + t * (table[i + 1][k][0] - table[i][k][0]), 0.0]);
-        }
-        let mut mixed = [[0.0; 2]; 2];
-        for (place, weight) in corners([x / self.step, y / self.step]).into_iter().flatten() {
-            for (sum, value) in mixed.as_flattened_mut().iter_mut().zip(table[place].as_flattened()) {
-                *sum += weight * value;
+            TransferTable::Sided(table) => {
+                let mut mixed = [[0.0; 2]; 2];
+                for (place, weight) in corners([x / self.step, y / self.step]).into_iter().flatten() {
+                    for (sum, value) in mixed.as_flattened_mut().iter_mut().zip(table[place].as_flattened()) {
+                        *sum += weight * f64::from(*value);
+                    }
+                }
+                mixed
             }
         }
-        mixed
     }
 }
 
+/// Adds values times periodic factors.
 #[multiversion(targets = "simd")]
-fn add_scaled(sums: &mut [f64], values: &[f64], factor: f64) {
-    sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += factor * value);
+fn add_scaled<const N: usize>(sums: &mut [f32], values: &[f32], factors: &[f32; N]) {
+    for (sums, values) in sums.as_chunks_mut::<N>().0.iter_mut().zip(values.as_chunks::<N>().0) {
+        for i in 0..N {
+            sums[i] += factors[i] * values[i];
+        }
+    }
 }
 
 /// Polynomial nodes of a section of a profile: a minimum, and the number per fringe.
 const NODES: (usize, f64) = (14, 3.5);
 
 /// Defocus in µm of mountant from which negligible transfer is omitted.
-const FAR_UM: f64 = 15.0;
+pub(crate) const FAR_UM: f64 = 15.0;
 /// Transfer functions at large defocus oscillate around 0 with decreasing amplitude in q = 2π f r, r the radius of the
 /// condenser's cone. From this q on they stay below 0.01 and are omitted: no object has enough detail there, and their
 /// fringes would dominate the computing time.

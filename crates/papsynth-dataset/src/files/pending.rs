@@ -154,6 +154,9 @@ impl Drop for Pending {
     }
 }
 
+/// Largest number of bytes that are written and hashed in one step: they stay in the processor's cache between the two.
+const STEP_BYTES: usize = 1 << 20;
+
 /// A file that is written from front to back, and hashed while it is written.
 pub(crate) struct Output {
     writer: BufWriter<Handle>,
@@ -206,7 +209,7 @@ impl Output {
 
 impl Write for Output {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let written = self.writer.write(bytes)?;
+        let written = self.writer.write(&bytes[..bytes.len().min(STEP_BYTES)])?;
         self.hash.update(&bytes[..written]);
         self.bytes += written as u64;
         Ok(written)

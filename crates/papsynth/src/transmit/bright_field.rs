@@ -37,13 +37,14 @@ pub(crate) struct BrightFieldPath {
     groups: Vec<LightGroup>,
     /// Correction of overlapping colours, if the light is coloured.
     overlaps: Option<Overlaps>,
-    /// Patches of each object, if several planes use them.
-    cached_patches: Option<Vec<Mutex<Option<ObjectPatches>>>>,
+    /// Patches of each object, cropped or not, if several planes use them.
+    cached_patches: Option<Vec<Mutex<Vec<ObjectPatches>>>>,
 }
 
 /// The transmittance of an object, transformed for imaging at any focus.
 #[derive(Debug, Default)]
 struct ObjectPatches {
+    window: Window,
     /// One patch per light.
     patches: Vec<Patch>,
     /// Restoration weight of each pixel, if the object has an imaged texture.
@@ -254,15 +255,23 @@ impl BrightFieldPath {
         if !window.meets(width, height, margin_px) {
             return Ok(None);
         }
+        // Frames of a slide have the same pixels where they overlap.
+        let is_cropped = specimen.scene.frame.is_none() && margin_px <= CROPPED_PX;
+        let window = if is_cropped { visible_part(&phantom.pieces, window, n, specimen.scene.view) } else { window };
         let mut buffers = locked(spare).pop().unwrap_or_default();
         let PatchBuffers { transmission, object_patches, scratch, factors, refocused } = &mut buffers;
         let mut cached_patches = self.cached_patches.as_ref().map(|cached_patches| locked(&cached_patches[index]));
-        let object_patches = match &mut cached_patches {
-            Some(cached_patches) => cached_patches.get_or_insert_with(|| {
-                let mut fresh = ObjectPatches::default();
-                self.fill_patches(phantom, group, (window, n), transmission, &mut fresh);
-                fresh
-            }),
+        let object_patches = match cached_patches.as_deref_mut() {
+            Some(cached_patches) => {
+                let same = cached_patches.iter().position(|patches| patches.window == window);
+                let index = same.unwrap_or(cached_patches.len());
+                if same.is_none() {
+                    let mut fresh = ObjectPatches::default();
+                    self.fill_patches(phantom, group, (window, n), transmission, &mut fresh);
+                    cached_patches.push(fresh);
+                }
+                &mut cached_patches[index]
+            }
             None => {
                 self.fill_patches(phantom, group, (window, n), transmission, object_patches);
                 object_patches
@@ -274,8 +283,7 @@ impl BrightFieldPath {
             let imager = &light.imager;
             imager.expose(patch, focus, scratch, factor);
             if !object_patches.restored.is_empty() {
-                let (depth_um, stage_um) = position(light);
-                let refocus = imager.refocus(depth_um, stage_um)?;
+                let refocus = imager.refocus(focus);
                 // Imaged textures are in the finest layer.
                 let finest = patch.layers() - 1;
                 let focus_of = |layer: usize| if layer == finest { &refocus } else { focus };
@@ -300,6 +308,7 @@ impl BrightFieldPath {
         transmission: &mut ObjectTransmission,
         object_patches: &mut ObjectPatches,
     ) {
+        object_patches.window = window;
         group.mixer.compose(&phantom.pieces, window, n, transmission);
         object_patches.patches.resize_with(group.lights.len(), Patch::default);
         for (index, (light, patch)) in group.lights.iter().zip(&mut object_patches.patches).enumerate() {
@@ -321,6 +330,18 @@ impl BrightFieldPath {
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Objects are cropped at this distance from the image if their blur radius is not larger. It is the same for all
+/// planes, so that a plane does not depend on the others.
+const CROPPED_PX: usize = 32;
+
+/// Returns the part of an object's window that affects an image, with all pieces that are sampled more finely.
+fn visible_part(pieces: &[Piece], window: Window, n: usize, view: View) -> Window {
+    let coarsest = pieces.iter().map(|piece| piece.step).max().unwrap_or(1);
+    let finer = Window::around(pieces.iter().filter(|piece| piece.step < coarsest), n);
+    let part = window.cropped(view.width, view.height, CROPPED_PX);
+    finer.map_or(part, |finer| part.with(finer))
 }
 
 /// Returns a layer of an object in a light, relative to the object's window.

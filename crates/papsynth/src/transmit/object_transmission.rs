@@ -114,6 +114,31 @@ impl Window {
         inside(0, self.width, width) && inside(1, self.height, height)
     }
 
+    /// Returns the part inside an image of this size extended by a margin. The rectangle must intersect it.
+    pub(super) fn cropped(self, width: usize, height: usize, margin: usize) -> Self {
+        let margin = margin as i64;
+        let mut part = self;
+        for (axis, (side, size)) in [&mut part.width, &mut part.height].into_iter().zip([width, height]).enumerate() {
+            let low = self.origin[axis].max(-margin);
+            let high = (self.origin[axis] + *side as i64).min(size as i64 + margin);
+            part.origin[axis] = low;
+            *side = usize::try_from(high - low).unwrap_or(0);
+        }
+        part
+    }
+
+    /// Returns the smallest rectangle around this and another one.
+    pub(super) fn with(self, other: Self) -> Self {
+        let mut sides = [0; 2];
+        let ends = [[self.width, other.width], [self.height, other.height]];
+        let origin = [0, 1].map(|axis| self.origin[axis].min(other.origin[axis]));
+        for (axis, (side, [own, others])) in sides.iter_mut().zip(ends).enumerate() {
+            let end = (self.origin[axis] + own as i64).max(other.origin[axis] + others as i64);
+            *side = usize::try_from(end - origin[axis]).unwrap_or(0);
+        }
+        Self { origin, width: sides[0], height: sides[1] }
+    }
+
     /// Returns the same rectangle in samples, `samples` per pixel and axis.
     pub(super) fn sampled(self, samples: usize) -> Self {
         Self {
@@ -448,4 +473,18 @@ pub(super) fn blurred_tile(tile: &Tile, gaussian: &Gaussian, mut values: Vec<f32
     values.resize(width * (tile.height() + 2 * margin), 0.0);
     gaussian.blur_expanded_into(&tile.values, tile.width, &mut values, scratch);
     Tile { origin: tile.origin.map(|at| at - margin as i64), width, values }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_are_cropped_and_joined() {
+        let window = |origin: [i64; 2], width, height| Window { origin, width, height };
+        assert_eq!(window([-20, 30], 60, 50).cropped(100, 70, 8), window([-8, 30], 48, 48));
+        assert_eq!(window([90, -3], 10, 5).cropped(100, 70, 8), window([90, -3], 10, 5));
+        assert_eq!(window([-400, -400], 900, 900).cropped(100, 70, 0), window([0, 0], 100, 70));
+        assert_eq!(window([1, 2], 3, 4).with(window([-5, 3], 7, 2)), window([-5, 2], 9, 4));
+    }
 }
