@@ -24,6 +24,7 @@ mod scratch;
 mod smooth;
 mod spectrum;
 mod transfer;
+mod transfer_cache;
 mod window;
 
 pub use abbe::{Abbe, AbbeParams, Layer, Source};
