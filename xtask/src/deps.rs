@@ -43,7 +43,7 @@ const RULES: [(&[&str], &[&[&str]]); 15] = [
     // Translates errors of the techniques to options of `papsynth calibrate`.
     (&["papsynth-cli"], &[TECHNIQUES, ENGINE, FRONT, &["papsynth-match", "papsynth-study", "papsynth-web"]]),
     // The same for Python.
-    (&["papsynth-python"], &[TECHNIQUES, ENGINE, FRONT]),
+    (&["papsynth-python"], &[TECHNIQUES, ENGINE, FRONT, &["papsynth-match"]]),
     // Measures public functions.
     (&["papsynth-benches"], &[TECHNIQUES, ENGINE, &["papsynth-dataset"]]),
     // Runs without files and threads.

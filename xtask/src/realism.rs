@@ -1,4 +1,4 @@
-//! Compares synthetic fields with real fields that were not used for fitting.
+//! Matches recipes to each half of the real fields, and compares their fields with both halves.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -21,7 +21,7 @@ const FOREST: &str = "numpy\npillow\npycocotools\nscikit-learn\nscipy\n";
 
 /// Grades of the real fields: code, name and preset.
 const GRADES: [(&str, &str, &str); 3] =
-    [("N", "negative", "lbc"), ("L", "low-grade lesion", "lsil"), ("H", "high-grade lesion", "high-grade")];
+    [("N", "negative", "extended-focus"), ("L", "low-grade lesion", "lsil"), ("H", "high-grade lesion", "high-grade")];
 
 pub(crate) fn run(workspace: &Workspace, quick: bool) -> Result<()> {
     let Some(reference) = std::env::var_os("PAPSYNTH_REFERENCE").map(PathBuf::from) else {
@@ -30,35 +30,40 @@ pub(crate) fn run(workspace: &Workspace, quick: bool) -> Result<()> {
     let folder = workspace.target.join("realism");
     shell::make(&folder)?;
     let halves = halves(&reference.join("cervix93"), &folder)?;
-    let matched = |grade: &str| folder.join(format!("matched-{grade}.toml"));
+    let matched = |grade: &str, half: usize| folder.join(format!("matched-{grade}-{half}.toml"));
     let mut table = String::from("fields | recipe | judged | AUC (95 %) | between real halves\n---|---|---|---|---\n");
     for (grade, name, preset) in GRADES {
-        let matched = matched(grade);
-        let mut fit = program(workspace);
-        fit.args(["match", "--pixel-um", PIXEL_UM, "--group", grade, "--preset", preset, "--out"]).arg(&matched);
-        fit.arg(&halves[0]);
-        if quick {
-            fit.arg("--quick");
-        }
-        shell::run(&mut fit)?;
-        let mut recipes = vec![("default", vec!["--preset".into(), preset.into()]), ("matched", vec![matched])];
-        if grade == "N" {
-            recipes.push(("extended-focus", vec!["--preset".into(), "extended-focus".into()]));
-        }
-        for (what, recipe) in recipes {
-            let fields = folder.join(format!("fields-{what}-{grade}"));
-            // The real fields are of many slides.
-            let words = ["--frames", FRAMES, "--set", "slide.fields_per_slide=1"].map(PathBuf::from);
-            dataset::generate(program(workspace), &fields, recipe.into_iter().chain(words))?;
-            let report = folder.join(format!("report-{what}-{grade}"));
-            let mut judge = program(workspace);
-            judge.arg("judge").arg(&halves[1]).arg(&fields).arg("--out").arg(&report);
-            judge.args(["--pixel-um", PIXEL_UM, "--group", grade]);
-            shell::run(&mut judge)?;
-            table += &judgements(&report, name, what)?;
+        for half in [0, 1] {
+            let matched = matched(grade, half);
+            let mut fit = program(workspace);
+            fit.args(["match", "--pixel-um", PIXEL_UM, "--group", grade, "--preset", preset, "--force", "--out"]);
+            fit.arg(&matched).arg(&halves[half]);
+            if quick {
+                fit.arg("--quick");
+            }
+            shell::run(&mut fit)?;
+            let mut recipes = vec![("matched", vec![matched])];
+            if half == 0 {
+                recipes.push(("preset", vec!["--preset".into(), preset.into()]));
+            }
+            for (what, recipe) in recipes {
+                let fields = folder.join(format!("fields-{what}-{grade}-{half}"));
+                // The real fields are of many slides.
+                let words = ["--frames", FRAMES, "--set", "slide.fields_per_slide=1"].map(PathBuf::from);
+                dataset::generate(program(workspace), &fields, recipe.into_iter().chain(words))?;
+                for (judged, against) in [(half, "fitted half"), (1 - half, "other half")] {
+                    let report = folder.join(format!("report-{what}-{grade}-{half}-{judged}"));
+                    let mut judge = program(workspace);
+                    judge.arg("judge").arg(&halves[judged]).arg(&fields).arg("--out").arg(&report);
+                    judge.args(["--pixel-um", PIXEL_UM, "--group", grade]);
+                    shell::run(&mut judge)?;
+                    table +=
+                        &judgements(&report, &format!("{name}, {against}"), &format!("{what}, half {}", half + 1))?;
+                }
+            }
         }
     }
-    for (what, recipe) in [("default", None), ("matched", Some(matched("N")))] {
+    for (what, recipe) in [("default", None), ("matched", Some(matched("N", 0)))] {
         table += &match python::environment(workspace, "forest", FOREST) {
             Ok(python) => forest(workspace, &python, &reference, &folder, what, recipe)?,
             Err(reason) if reason.is::<Skipped>() => {

@@ -44,7 +44,13 @@ impl Control<'static> {
     pub const NONE: Self = Self { stop: &NEVER, report: &|_| () };
 }
 
-impl Control<'_> {
+impl<'a> Control<'a> {
+    /// Returns the same stop flag without progress reports.
+    #[must_use]
+    pub fn silent(&self) -> Control<'a> {
+        Control { stop: self.stop, report: &|_| () }
+    }
+
     /// Returns whether the stop flag is set.
     #[must_use]
     pub fn is_stopped(&self) -> bool {

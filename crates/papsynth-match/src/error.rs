@@ -5,8 +5,18 @@
 #[non_exhaustive]
 pub enum Error {
     /// No images.
-    #[error("no fields; expected 1 or more")]
+    #[error("no fields; expected 2 or more")]
     NoField,
+    /// Too few images.
+    #[error("{} for {what}; expected {least} or more, because fields differ", counted(*found, "field", "fields"))]
+    Fields {
+        /// Number of images.
+        found: usize,
+        /// Minimum number.
+        least: usize,
+        /// What they are for.
+        what: &'static str,
+    },
     /// An image of another size than the first one, or a black image.
     #[error("field `{name}` {what}")]
     Field {

@@ -1,19 +1,23 @@
-//! The complete match: measurement, simulation, regression, search.
+//! The complete match: measurement, simulation, regression, rounds around the result.
 
 use papsynth::recipe::{self, Recipe};
-use papsynth_judge::{Control, FieldImage, Phase};
+use papsynth_judge::{Control, Detail, FieldImage, Phase, Report};
+use portable_numerics::random::normal;
+use rand_core::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::compare::{LEAST_FIELDS as LEAST_REFINED, Refine, Refinement, report};
+use crate::distance::{Distance, Statistic, statistics};
 use crate::error::Error;
-use crate::measured::{Measured, measure_with};
-use crate::parameter::{PARAMETERS, Parameter, Prior, Source, Values};
-use crate::recipe::{Setting, recipe};
-use crate::refine::{Forward, distance, propose};
-use crate::regression::{Estimate, Regression, WIDEST};
-use crate::summary::{Summary, Window};
-use crate::table::{Plan, SIMULATING, TableParams};
-use crate::view::{MakeEngine, WindowSampler};
+use crate::measured::{Measured, measure_in};
+use crate::parameter::{Level, PARAMETERS, Parameter, Prior, Source, Values};
+use crate::posterior::{Knowledge, NEAR_SD, PRIOR_SD, Posterior, Response, Rows};
+use crate::recipe::{Setting, matched, recipe, simulated};
+use crate::sampler::{MakeEngine, Sampler};
+use crate::simulate::{Simulator, latin, samples_of};
+use crate::summary::{NUCLEAR_AREA, Summary};
 
 /// Pixel size.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -39,27 +43,27 @@ impl PixelSize {
 pub struct MatchParams {
     /// Pixel size. Default: known, 0.33 µm.
     pub pixel: PixelSize,
-    /// Windows to simulate before the search, 60 to 1000000. Default 2000.
+    /// Fields to simulate with parameters from their complete ranges, 60 to 1000000. Default 150.
     pub simulations: usize,
-    /// Windows of each simulated recipe, 1 to 1000; at most the number of real fields. Default 8.
-    pub windows: usize,
-    /// Rounds of the search, 0 to 1000. Default 8.
+    /// Rounds of simulations around the result, 0 to 100. Default 6.
     pub rounds: usize,
+    /// Rounds of the search against classifiers that distinguish simulated from real fields, 0 to 10000. Default 0.
+    pub refine: usize,
     /// Seed of all random draws. Default 0.
     pub seed: u64,
 }
 
 impl MatchParams {
-    /// Returns parameters for a first look: a sixth of the simulations, wider intervals, fewer identified parameters.
+    /// Returns parameters for a first look: a third of the simulations, wider intervals.
     #[must_use]
     pub fn quick() -> Self {
-        Self { simulations: 336, rounds: 3, ..Self::default() }
+        Self { simulations: 100, rounds: 2, ..Self::default() }
     }
 }
 
 impl Default for MatchParams {
     fn default() -> Self {
-        Self { pixel: PixelSize::Known(0.33), simulations: 2000, windows: 8, rounds: 8, seed: 0 }
+        Self { pixel: PixelSize::Known(0.33), simulations: 150, rounds: 6, refine: 0, seed: 0 }
     }
 }
 
@@ -69,10 +73,10 @@ impl Default for MatchParams {
 pub enum Origin {
     /// A statistic of the real fields.
     Measured,
-    /// Simulations: windows with this value are similar to the real ones.
+    /// Simulations: fields with this value are similar to the real ones.
     Simulated,
-    /// The initial recipe, because the fields do not determine the value.
-    NotIdentified,
+    /// The initial recipe, because the value has no visible influence on these fields.
+    NotVisible,
 }
 
 /// Result for a parameter.
@@ -80,16 +84,21 @@ pub enum Origin {
 pub struct ParameterFit {
     /// Parameter.
     pub parameter: Parameter,
-    /// Fields of the recipe.
+    /// Numbers of the recipe.
     pub path: &'static str,
     /// Unit.
     pub unit: &'static str,
     /// Origin of the value.
     pub origin: Origin,
-    /// Value in the matched recipe.
+    /// Mean over the fields; of the logarithm for a logarithmic parameter.
     pub value: f64,
-    /// 95 % interval.
+    /// 95 % interval of this mean.
     pub interval: [f64; 2],
+    /// Standard deviation between fields; of the logarithm for a logarithmic parameter. 0 if all fields share one
+    /// value.
+    pub spread: f64,
+    /// Value in each field; empty if all fields share one value.
+    pub fields: Vec<f64>,
     /// Value in the initial recipe.
     pub before: f64,
     /// Range of the search.
@@ -103,56 +112,30 @@ impl ParameterFit {
     pub(crate) fn new(parameter: Parameter, origin: Origin, value: f64) -> Self {
         let Prior { path, unit, low, high, .. } = parameter.prior();
         let range = [low, high];
-        Self { parameter, path, unit, origin, value, interval: range, before: value, range, width: 1.0 }
+        let (spread, fields) = (0.0, Vec::new());
+        Self { parameter, path, unit, origin, value, interval: range, spread, fields, before: value, range, width: 1.0 }
     }
-}
-
-/// Root mean square of the differences between simulated and real statistics, in standard errors. For two sets of
-/// windows of one recipe it is about 1.4.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Distance {
-    /// For the initial recipe.
-    pub before: f64,
-    /// For the values from measurement and regression.
-    pub estimated: f64,
-    /// After the search.
-    pub after: f64,
-}
-
-/// A statistic of the real and of the simulated windows.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Statistic {
-    /// Name.
-    pub name: String,
-    /// For the real windows.
-    pub real: f64,
-    /// For the initial recipe.
-    pub before: f64,
-    /// For the matched recipe.
-    pub after: f64,
-    /// Difference between matched recipe and real windows, in standard errors.
-    pub standard_errors: f64,
 }
 
 /// Result of a match.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Fit {
-    /// Matched recipe.
+    /// Matched recipe, with one condition for each real field.
     #[serde(skip)]
     pub recipe: Recipe,
     /// All parameters.
     pub parameters: Vec<ParameterFit>,
-    /// Distance between simulated and real windows.
+    /// Distance between simulated and real fields.
     pub distance: Distance,
     /// All statistics.
     pub statistics: Vec<Statistic>,
-    /// Number of real fields.
-    pub fields: usize,
-    /// Number of windows in the real fields.
-    pub windows: usize,
-    /// Number of nuclei in the windows.
+    /// The search against classifiers, if there was one.
+    pub refinement: Option<Refinement>,
+    /// Names of the real fields.
+    pub fields: Vec<String>,
+    /// Number of nuclei in the real fields.
     pub nuclei: usize,
-    /// Number of simulated recipes.
+    /// Number of simulated fields.
     pub simulated: usize,
     /// Whether the real fields are fused from several focal planes (extended depth of field).
     pub extended: bool,
@@ -165,15 +148,32 @@ pub struct Match {
     base: Recipe,
 }
 
-/// Minimum number of recipes of the table.
-const LEAST_RECIPES: usize = 30;
+/// Minimum number of fields: one does not show the variation between fields.
+const LEAST_FIELDS: usize = 2;
 
 /// Minimum number of nuclei to estimate stain and sizes.
 const LEAST_NUCLEI: usize = 8;
 
-/// Differences between the seed of the table and those of the search and of the final comparison.
-const SEARCH: u64 = 1 << 40;
-const LAST: u64 = 1 << 41;
+/// Fields to simulate in a round, at least.
+const ROUND: usize = 32;
+
+/// Standard deviations of the parameters in the first and in the last rounds, in standard errors: the first ones show
+/// how statistics depend on the parameters, the last ones the statistics of the result.
+const WIDE: f64 = 1.5;
+const NARROW: f64 = 0.4;
+
+/// Fields to simulate for the final comparison, of each recipe.
+const COMPARED: usize = 16;
+
+/// Number of pixel sizes that are tried.
+const PIXELS: f64 = 12.0;
+
+/// Indices of the first simulated fields of the search against classifiers, and of the comparison.
+const REFINED: usize = 1 << 40;
+const COMPARISON: usize = 1 << 41;
+
+/// Name of the phase of simulations in progress reports.
+const SIMULATING: &str = "simulating fields";
 
 impl Match {
     /// Checks the parameters. `base` is the initial recipe.
@@ -183,11 +183,11 @@ impl Match {
     pub fn new(params: &MatchParams, base: &Recipe) -> Result<Self, Error> {
         papsynth_judge::Error::check(&[
             ("simulations", params.simulations as f64, [60.0, 1e6], "60 to 1000000"),
-            ("windows", params.windows as f64, [1.0, 1e3], "1 to 1000"),
-            ("rounds", params.rounds as f64, [0.0, 1e3], "0 to 1000"),
+            ("rounds", params.rounds as f64, [0.0, 100.0], "0 to 100"),
+            ("refine", params.refine as f64, [0.0, 1e4], "0 to 10000"),
             ("pixel_um", params.pixel.um(), [0.05, 4.0], "0.05 to 4"),
         ])?;
-        Ok(Self { params: params.clone(), base: base.clone() })
+        Ok(Self { params: params.clone(), base: base.without_conditions() })
     }
 
     /// Returns the setting for real fields, and the known parameter values.
@@ -201,196 +201,330 @@ impl Match {
             bits: measured.bits,
             extended: measured.extended,
             seek_pixel: matches!(self.params.pixel, PixelSize::Sought(_)),
-            field_sd: measured.field_sd,
         };
         let mut known = setting.base_values();
         for (parameter, estimate) in &measured.estimates {
             known.set(*parameter, estimate.value);
         }
+        known.set(Parameter::Pixel, self.params.pixel.um());
         (setting, known)
     }
 
     /// Finds the recipe of real fields. The result does not depend on the number of threads.
     ///
-    /// The phases of the progress reports are "measuring fields", "measuring windows", "simulating fields", "fitting
-    /// regressions" and "searching, distance …". The last one continues the count of "simulating fields", so the time
-    /// of the first simulations gives the remaining time of the complete match, except for the seconds of "fitting
-    /// regressions".
+    /// The phases of the progress reports are "measuring fields" and "simulating fields", which continue one count, and
+    /// "refining, AUC …".
     ///
     /// # Errors
     /// If there are no fields, or too few nuclei in them, or recipes cannot be simulated; [`Error::Stopped`] if the
     /// stop flag is set.
     pub fn run(&self, fields: &[FieldImage], make: &MakeEngine<'_>, control: &Control) -> Result<Fit, Error> {
-        let measured = measure_with(fields, self.params.pixel.um(), control)?;
-        let view = WindowSampler::new(measured.size_px, self.params.pixel.um(), measured.nuclei_from)?;
-        let pictures: Vec<FieldImage> = fields.iter().flat_map(|f| view.windows(f)).collect();
-        let windows = Window::all(&pictures, &view, control)?;
-        let nuclei = windows.iter().map(Window::nuclei).sum();
+        if fields.is_empty() {
+            return Err(Error::NoField);
+        }
+        if fields.len() < LEAST_FIELDS {
+            return Err(Error::Fields { found: fields.len(), least: LEAST_FIELDS, what: "a match" });
+        }
+        if self.params.refine > 0 && fields.len() < LEAST_REFINED {
+            return Err(Error::Fields {
+                found: fields.len(),
+                least: LEAST_REFINED,
+                what: "a search against classifiers",
+            });
+        }
+        let per_round = ROUND.max(fields.len().min(2 * ROUND));
+        let count = self.params.simulations + self.params.rounds * per_round + 2 * COMPARED;
+        let total = 2 * fields.len() + count;
+        let phase = control.resume("measuring fields", 0, total);
+        let measured = measure_in(fields, self.params.pixel.um(), &phase)?;
+        let sampler = Sampler::new(measured.size_px, self.params.pixel.um(), measured.nuclei_from, Detail::Statistics)?;
+        let (real, samples) = of_fields(fields, &sampler, &phase)?;
+        check_magnification(fields, &real)?;
+        let nuclei = real.iter().map(|field| field.nuclei).sum();
         if nuclei < LEAST_NUCLEI {
             let pixel_um = self.params.pixel.um();
             return Err(Error::Nuclei { found: nuclei, fields: fields.len(), least: LEAST_NUCLEI, pixel_um });
         }
-        let real = Summary::new(&windows);
-
         let (setting, known) = self.setting(&measured);
-        let per_recipe = self.params.windows.min(fields.len());
-        let recipes = (self.params.simulations / per_recipe).max(LEAST_RECIPES);
-        let params = TableParams { recipes, windows: per_recipe, seed: self.params.seed };
-        let plan = Plan::new(&setting, &known, &view, make, &params)?;
-        let total = plan.windows() + Search::simulations(&plan, self.params.rounds);
-        let table = plan.simulate_in(&control.phase(SIMULATING, total))?;
-        let regression = Regression::new_with(&table.statistics, &table.places, control)?;
-        let estimates = regression.estimate(&real.values);
-        let forward = Forward::new(&table, control)?;
-        let search = Search { plan: &plan, measured: &measured, forward, estimates, control, total };
-        let (places, distance, statistics) = search.run(&real, self.params.rounds)?;
-        let parameters = search.parameters(&places);
-        let fitted = |parameter: Parameter| {
-            parameters.iter().any(|a| a.parameter == parameter && a.origin != Origin::NotIdentified)
+        let simulator = Simulator { setting: &setting, sampler: &sampler, make, seed: self.params.seed };
+        let sought = simulated(&setting);
+        let mut search = Search { measured: &measured, real: &real, samples, known, sought, rows: Rows::default() };
+
+        let mut done = 2 * fields.len();
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(self.params.seed ^ 0x726f_756e_6473);
+        let place = |p: &Parameter| p.prior().place(search.known.get(*p)).clamp(0.0, 1.0);
+        let prior: Vec<f64> = search.sought.iter().map(place).collect();
+        let mut posterior = Posterior::prior(&prior, fields.len());
+        for round in 0..=self.params.rounds {
+            let phase = control.resume(SIMULATING, done, total);
+            let draws = match round {
+                0 => search.table(self.params.simulations, self.params.seed),
+                _ => {
+                    let width = if 2 * round <= self.params.rounds { WIDE } else { NARROW };
+                    search.around(&posterior, width, (round - 1) * per_round, per_round, &mut rng)
+                }
+            };
+            search.simulate(&simulator, draws, done, &phase)?;
+            posterior = search.posterior(&posterior, &prior, &phase)?;
+            done = phase.done();
+        }
+
+        let mut refinement = None;
+        if self.params.refine > 0 {
+            let detailed =
+                Sampler::new(measured.size_px, self.params.pixel.um(), measured.nuclei_from, Detail::Everything)?;
+            let moving: Vec<bool> = (0..search.sought.len()).map(|c| posterior.is_visible(c)).collect();
+            let recipe = |at: &Posterior| search.results(&setting, at).1;
+            let (sampler, seed) = (&detailed, self.params.seed);
+            let refine = Refine { sampler, make, seed, first: REFINED, recipe: &recipe, moving: &moving };
+            let (found, result) = refine.run(fields, &posterior, self.params.refine, control)?;
+            (posterior, refinement) = (found, Some(result));
+        }
+
+        let (parameters, recipe) = search.results(&setting, &posterior);
+        let phase = control.resume(SIMULATING, done, total);
+        let samples = |of: &Recipe, first: usize| {
+            let measure = |image: &FieldImage| Summary::of(image, &sampler, control);
+            samples_of(of, &sampler, make, [first, COMPARED], &phase, self.params.seed, measure)
         };
+        let before = samples(&self.initial(&setting), done)?;
+        let after = samples(&recipe, done + COMPARED)?;
+        let (distance, statistics) = statistics(&real, &before, &after);
         Ok(Fit {
-            recipe: recipe(&setting, &plan.values(&places), fitted),
+            recipe,
             parameters,
             distance,
             statistics,
-            fields: fields.len(),
-            windows: pictures.len(),
+            refinement,
+            fields: fields.iter().map(|field| field.name.clone()).collect(),
             nuclei,
-            simulated: table.places.len(),
+            simulated: count,
             extended: measured.extended,
         })
     }
+
+    /// Compares real fields with simulated fields of the result by the classifiers of `papsynth-judge`: a report with
+    /// crops of both, those that differ most first.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run), and for fewer than two fields.
+    pub fn compare(
+        &self,
+        fields: &[FieldImage],
+        fit: &Fit,
+        make: &MakeEngine<'_>,
+        control: &Control,
+    ) -> Result<Report, Error> {
+        let (pixel_um, first) = (self.params.pixel.um(), fields.first().ok_or(Error::NoField)?);
+        let from = crate::measured::nuclei_from(fields);
+        let sampler = Sampler::new([first.width, first.height()], pixel_um, from, Detail::Everything)?;
+        report(fields, &sampler, make, &fit.recipe, COMPARISON, self.params.seed, control)
+    }
+
+    /// Returns the initial recipe for images of the size of the real ones.
+    fn initial(&self, setting: &Setting) -> Recipe {
+        let mut initial = recipe(setting, &setting.base_values(), |_| false);
+        initial.slide.fields_per_slide = 1;
+        initial
+    }
 }
 
-/// The search around the estimates.
+/// Measures real fields: the mean over the samples of each, and the number of samples of a field.
+fn of_fields(fields: &[FieldImage], sampler: &Sampler, phase: &Phase) -> Result<(Vec<Summary>, usize), Error> {
+    let one = |field: &FieldImage| -> Result<(Summary, usize), Error> {
+        let samples = sampler.samples(field);
+        let measured = samples.iter().map(|image| Summary::of(image, sampler, phase.control()));
+        let measured: Vec<Summary> = measured.collect::<Result<_, _>>()?;
+        phase.step()?;
+        Ok((Summary::mean(&measured), samples.len()))
+    };
+    let all: Vec<Result<(Summary, usize), Error>> = fields.par_iter().map(one).collect();
+    let all: Vec<(Summary, usize)> = all.into_iter().collect::<Result<_, _>>()?;
+    let count = all.first().map_or(0, |(_, count)| *count);
+    Ok((all.into_iter().map(|(summary, _)| summary).collect(), count))
+}
+
+/// Checks that no field has nuclei of another size than all others, as at another magnification.
+fn check_magnification(fields: &[FieldImage], real: &[Summary]) -> Result<(), Error> {
+    /// Largest ratio of median nuclear areas: fields with and without lesions differ less, magnifications of 20 and 40
+    /// more.
+    const LARGEST: f64 = 3.6;
+    let column = real[0].names.iter().position(|name| name == NUCLEAR_AREA);
+    let Some(column) = column else { return Ok(()) };
+    let areas: Vec<f64> = real.iter().map(|field| field.values[column]).collect();
+    let mut known: Vec<f64> = areas.iter().copied().filter(|area| area.is_finite()).collect();
+    let middle = portable_numerics::statistics::quantile(&mut known, 0.5);
+    match areas.iter().position(|area| (area - middle).abs() > libm::log(LARGEST)) {
+        Some(i) => {
+            let [own, all] = [areas[i], middle].map(|log| libm::exp(log).round());
+            let what = format!(
+                "has a median nuclear area of {own} µm², and all fields together {all} µm²; expected fields of one magnification"
+            );
+            Err(Error::Field { name: fields[i].name.clone(), what })
+        }
+        None => Ok(()),
+    }
+}
+
+/// The simulations of a match.
 struct Search<'a> {
-    plan: &'a Plan<'a>,
     measured: &'a Measured,
-    forward: Forward,
-    estimates: Vec<Estimate>,
-    control: &'a Control<'a>,
-    /// Simulations of the table and of the search.
-    total: usize,
+    real: &'a [Summary],
+    /// Number of samples of each real field.
+    samples: usize,
+    /// Values of the initial recipe, and measured ones.
+    known: Values,
+    sought: Vec<Parameter>,
+    rows: Rows,
 }
 
-/// Positions of all sought parameters, distance, and all statistics.
-type Found = (Vec<f64>, Distance, Vec<Statistic>);
+/// Positions of the sought parameters of a sample in their ranges, and the index of the field whose light it has.
+type Draw = (Vec<f64>, Option<usize>);
 
 impl Search<'_> {
-    /// Returns the number of simulations of a search: one start, its rounds and three final comparisons.
-    fn simulations(plan: &Plan, rounds: usize) -> usize {
-        (rounds + 4) * Self::windows(plan)
+    /// Draws samples from the complete ranges.
+    fn table(&self, count: usize, seed: u64) -> Vec<Draw> {
+        let mut draws = latin(count, self.sought.len(), seed);
+        draws.iter_mut().for_each(|draw| self.on_grid(draw));
+        draws.into_iter().map(|places| (places, None)).collect()
     }
 
-    fn windows(plan: &Plan) -> usize {
-        plan.params.windows.max(2)
-    }
-
-    fn identified(&self, parameter: Parameter) -> bool {
-        match parameter.prior().source {
-            Source::Measured => self.measured.get(parameter).is_some_and(|e| width_of_value(parameter, &e) <= WIDEST),
-            Source::Simulated => {
-                let place = self.plan.sought().iter().position(|p| *p == parameter);
-                place.is_some_and(|i| self.estimates[i].high - self.estimates[i].low <= WIDEST)
-            }
-        }
-    }
-
-    fn simulate(
+    /// Draws samples around the values of the fields, within `width` standard errors.
+    fn around(
         &self,
-        places: &[f64],
-        fitted: impl Fn(Parameter) -> bool + Sync,
-        seed: u64,
-        phase: &Phase,
-    ) -> Result<Summary, Error> {
-        let engine = self.plan.engine(places, fitted)?;
-        let indices = (0..Self::windows(self.plan)).into_par_iter();
-        let made = indices.map(|index| self.plan.window(&engine, seed, index, phase));
-        Ok(Summary::new(&made.collect::<Vec<_>>().into_iter().collect::<Result<Vec<_>, _>>()?))
+        found: &Posterior,
+        width: f64,
+        first: usize,
+        count: usize,
+        rng: &mut Xoshiro256PlusPlus,
+    ) -> Vec<Draw> {
+        const LEAST: f64 = 0.03;
+        const MOST: f64 = 0.3;
+        let draw = |i: usize| {
+            let field = i % found.fields.len();
+            let around = |(c, place): (usize, &f64)| {
+                let error = libm::hypot(found.errors[c], found.difference_errors[c]);
+                (place + (width * error).clamp(LEAST, MOST) * normal(rng)).clamp(0.0, 1.0)
+            };
+            let mut places: Vec<f64> = found.fields[field].iter().enumerate().map(around).collect();
+            self.on_grid(&mut places);
+            (places, Some(field))
+        };
+        (first..first + count).map(draw).collect()
     }
 
-    fn run(&self, real: &Summary, rounds: usize) -> Result<Found, Error> {
-        let (sought, seed) = (self.plan.sought(), self.plan.params.seed);
-        let base = self.plan.setting.base_values();
-        let fitted = |parameter: Parameter| self.identified(parameter);
-        let all = sought.iter().zip(self.estimates.iter().copied());
-        let moving: Vec<(usize, Estimate)> =
-            all.clone().enumerate().filter(|(_, (p, _))| fitted(**p)).map(|(i, (_, e))| (i, e)).collect();
-        // Parameters that are not identified keep the value of the initial recipe.
-        let start: Vec<f64> = all
-            .map(|(p, e)| if fitted(*p) { e.value } else { p.prior().place(base.get(*p)).clamp(0.0, 1.0) })
-            .collect();
-        let apart = |s: &Summary| self.forward.apart(&real.values, &s.values);
-        let phase = self.control.resume("searching", self.plan.windows(), self.total);
-        let seen = self.simulate(&start, fitted, seed ^ SEARCH, &phase)?;
-        let mut done = phase.done();
-        let mut best = (start.clone(), distance(&apart(&seen)), seen);
-        let mut towards: Option<Vec<f64>> = None;
-        for _ in 0..rounds {
-            let next = match &towards {
-                // A step that increased the distance is halved.
-                Some(failed) => failed.iter().zip(&best.0).map(|(a, b)| 0.5 * (a + b)).collect(),
-                None => propose(&self.forward, [&real.values, &best.2.values], &best.0, &moving),
-            };
-            let name = format!("searching, distance {:.2}", best.1);
-            let phase = self.control.resume(&name, done, self.total);
-            let seen = self.simulate(&next, fitted, seed ^ SEARCH, &phase)?;
-            done = phase.done();
-            let found = distance(&apart(&seen));
-            if found < best.1 {
-                best = (next, found, seen);
-                towards = None;
-            } else {
-                towards = Some(next);
+    /// Rounds the pixel size, because each pixel size needs an engine of its own.
+    fn on_grid(&self, places: &mut [f64]) {
+        if let Some(i) = self.sought.iter().position(|p| *p == Parameter::Pixel) {
+            places[i] = (places[i] * PIXELS).round() / PIXELS;
+        }
+    }
+
+    fn values(&self, places: &[f64], field: Option<usize>) -> Values {
+        let mut values = self.known.clone();
+        for (parameter, value) in field.map_or(&[][..], |i| &self.measured.fields[i]) {
+            values.set(*parameter, *value);
+        }
+        for (parameter, place) in self.sought.iter().zip(places) {
+            values.set(*parameter, parameter.prior().value(*place));
+        }
+        values
+    }
+
+    /// Simulates samples and adds them to the rows, as the next round.
+    fn simulate(&mut self, simulator: &Simulator, draws: Vec<Draw>, first: usize, phase: &Phase) -> Result<(), Error> {
+        let values: Vec<Values> = draws.iter().map(|(places, field)| self.values(places, *field)).collect();
+        let made = simulator.simulate(&values, first, phase)?;
+        let round = self.rows.rounds.last().map_or(0, |round| round + 1);
+        for ((places, _), summary) in draws.into_iter().zip(made) {
+            if let Some(summary) = summary {
+                self.rows.statistics.push(summary.values);
+                self.rows.places.push(places);
+                self.rows.rounds.push(round);
             }
         }
-        // The final comparison uses windows that the search did not use.
-        let name = format!("searching, distance {:.2}", best.1);
-        let phase = self.control.resume(&name, done, self.total);
-        let before = self.simulate(&start, |_| false, seed ^ LAST, &phase)?;
-        let estimated = distance(&apart(&self.simulate(&start, fitted, seed ^ LAST, &phase)?));
-        let after = self.simulate(&best.0, fitted, seed ^ LAST, &phase)?;
-        let off = apart(&after);
-        let distances = Distance { before: distance(&apart(&before)), estimated, after: distance(&off) };
-        let statistic = |i: usize| Statistic {
-            name: real.names[i].clone(),
-            real: real.values[i],
-            before: before.values[i],
-            after: after.values[i],
-            standard_errors: off[i],
-        };
-        Ok((best.0, distances, (0..real.names.len()).map(statistic).collect()))
+        Ok(())
     }
 
-    fn parameters(&self, places: &[f64]) -> Vec<ParameterFit> {
-        let base = self.plan.setting.base_values();
-        let sought = PARAMETERS.into_iter().filter(|p| self.plan.setting.seeks(*p));
+    fn posterior(&self, start: &Posterior, prior: &[f64], phase: &Phase) -> Result<Posterior, Error> {
+        let fields: Vec<Vec<f64>> = self.real.iter().map(|field| field.values.clone()).collect();
+        let varies: Vec<bool> = self.sought.iter().map(|p| p.prior().level == Level::Field).collect();
+        let near: Vec<f64> =
+            self.sought.iter().map(|p| if *p == Parameter::Pixel { PRIOR_SD } else { NEAR_SD }).collect();
+        let prior = Knowledge { means: prior, near: &near, varies: &varies };
+        Ok(Response::new(&self.rows, phase)?.posterior(&fields, self.samples, start, &prior))
+    }
+
+    /// Returns all parameters and the recipe.
+    fn results(&self, setting: &Setting, found: &Posterior) -> (Vec<ParameterFit>, Recipe) {
+        let base = setting.base_values();
+        let column = |parameter: Parameter| self.sought.iter().position(|p| *p == parameter);
+        let fitted = |parameter: Parameter| match (parameter.prior().source, column(parameter)) {
+            (Source::Measured, _) => self.measured.get(parameter).is_some(),
+            (Source::Simulated, Some(c)) => found.is_visible(c),
+            (Source::Simulated, None) => false,
+        };
+        let fields: Vec<Values> = (0..self.real.len())
+            .map(|i| {
+                let mut values = self.values(&found.fields[i], Some(i));
+                for (c, parameter) in self.sought.iter().enumerate() {
+                    let prior = parameter.prior();
+                    if prior.level == Level::Field {
+                        values.set_spread(*parameter, prior.difference(found.difference_errors[c]));
+                    } else {
+                        values.set(*parameter, prior.value(found.means[c]));
+                    }
+                }
+                values
+            })
+            .collect();
+        let mean = self.values(&found.means, None);
         let one = |parameter: Parameter| {
             let prior = parameter.prior();
-            let place = self.plan.sought().iter().position(|p| *p == parameter);
-            let (value, interval, width) = match (place, self.measured.get(parameter)) {
-                (Some(i), _) => {
-                    let e = self.estimates[i];
-                    (prior.value(places[i]), [e.low, e.high].map(|p| prior.value(p)), e.high - e.low)
-                }
-                (None, Some(e)) => (e.value, [e.low, e.high], width_of_value(parameter, &e)),
-                (None, None) => (base.get(parameter), [prior.low, prior.high], 1.0),
-            };
-            let origin = match (self.identified(parameter), prior.source) {
-                (false, _) => Origin::NotIdentified,
-                (true, Source::Measured) => Origin::Measured,
-                (true, Source::Simulated) => Origin::Simulated,
-            };
-            let before = base.get(parameter);
-            let value = if origin == Origin::NotIdentified { before } else { value };
-            ParameterFit { interval, before, width, ..ParameterFit::new(parameter, origin, value) }
+            let mut fit = ParameterFit::new(parameter, Origin::NotVisible, base.get(parameter));
+            if !fitted(parameter) {
+                return fit;
+            }
+            if prior.level == Level::Field {
+                fit.fields = fields.iter().map(|values| values.get(parameter)).collect();
+            }
+            if let Some(c) = column(parameter) {
+                let e = found.mean(c);
+                fit.origin = Origin::Simulated;
+                fit.value = prior.value(e.value);
+                fit.interval = [e.low, e.high].map(|place| prior.value(place));
+                fit.width = e.high - e.low;
+                fit.spread = prior.difference(found.spreads[c]);
+            } else if let Some(e) = self.measured.get(parameter) {
+                fit.origin = Origin::Measured;
+                fit.value = e.value;
+                fit.interval = [e.low, e.high];
+                fit.width = prior.place(e.high) - prior.place(e.low);
+                let places: Vec<f64> = fit.fields.iter().map(|value| prior.place(*value)).collect();
+                let sd = portable_numerics::statistics::deviation(&places);
+                fit.spread = if sd.is_finite() { prior.difference(sd) } else { 0.0 };
+            }
+            fit
         };
-        sought.map(one).collect()
+        let parameters = PARAMETERS.into_iter().filter(|p| setting.seeks(*p)).map(one).collect();
+        (parameters, matched(setting, &mean, &fields, fitted))
     }
 }
 
-/// Returns the width of an interval of values over that of the range.
-fn width_of_value(parameter: Parameter, e: &Estimate) -> f64 {
-    let prior = parameter.prior();
-    prior.place(e.high) - prior.place(e.low)
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_field_of_another_magnification_is_an_error() {
+        let fields = ["a", "b", "c"].map(|name| FieldImage { name: name.to_owned(), ..FieldImage::default() });
+        let real = |areas: [f64; 3]| {
+            areas.map(|area| Summary { names: vec![NUCLEAR_AREA.to_owned()], values: vec![libm::log(area)], nuclei: 9 })
+        };
+        // Lesions have larger nuclei.
+        assert_eq!(check_magnification(&fields, &real([40.0, 45.0, 110.0])), Ok(()));
+        assert_eq!(check_magnification(&fields, &real([40.0, f64::NAN, 45.0])), Ok(()));
+        let message = check_magnification(&fields, &real([40.0, 180.0, 45.0])).unwrap_err().to_string();
+        assert!(message.starts_with("field `b` has a median nuclear area of 180 µm²"), "{message}");
+    }
 }

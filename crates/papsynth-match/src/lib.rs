@@ -1,25 +1,28 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+mod compare;
+mod distance;
 mod error;
 mod fit;
 mod measured;
 mod noise;
 mod parameter;
+mod posterior;
 mod recipe;
-mod refine;
 mod regression;
+mod sampler;
+mod simulate;
 mod summary;
-mod table;
 mod text;
-mod view;
 
+pub use compare::{Refinement, Success};
+pub use distance::{Distance, Statistic};
 pub use error::Error;
-pub use fit::{Distance, Fit, Match, MatchParams, Origin, ParameterFit, PixelSize, Statistic};
+pub use fit::{Fit, Match, MatchParams, Origin, ParameterFit, PixelSize};
 pub use measured::{Measured, measure, measure_with};
-pub use parameter::{PARAMETERS, Parameter, Prior, Scale, Source, Values};
-pub use recipe::{FieldSd, Setting, recipe};
-pub use regression::{Estimate, Regression, WIDEST};
+pub use parameter::{Level, PARAMETERS, Parameter, Prior, Scale, Source, Values};
+pub use posterior::Estimate;
+pub use recipe::{Setting, recipe};
+pub use sampler::{MakeEngine, Sampler};
 pub use summary::Summary;
-pub use table::{Plan, SimulationTable, TableParams, unseen};
-pub use view::{MakeEngine, WindowSampler};

@@ -1,14 +1,15 @@
 //! Parameters that statistics of real fields measure directly: light, noise, bits.
 
-use papsynth_judge::{Control, FieldImage, NucleiFrom};
+use papsynth_judge::{Control, Detail, FieldImage, NucleiFrom, Phase};
 use rayon::prelude::*;
 
 use crate::error::Error;
 use crate::noise::{Empty, pattern};
 use crate::parameter::Parameter;
-use crate::recipe::{FieldSd, LEVELS};
-use crate::regression::{Estimate, min_max};
-use crate::view::WindowSampler;
+use crate::posterior::Estimate;
+use crate::recipe::LEVELS;
+use crate::regression::min_max;
+use crate::sampler::Sampler;
 use portable_numerics::statistics::{deviation, mean, quantile};
 
 /// Minimum grey level of an empty slide, of 255.
@@ -56,8 +57,8 @@ pub struct Measured {
     pub nuclei_from: NucleiFrom,
     /// Measured parameters with 95 % intervals.
     pub estimates: Vec<(Parameter, Estimate)>,
-    /// Standard deviations between fields.
-    pub field_sd: FieldSd,
+    /// Measured parameters of each field; those of the mean where a field shows none.
+    pub fields: Vec<Vec<(Parameter, f64)>>,
 }
 
 impl Measured {
@@ -66,6 +67,11 @@ impl Measured {
     pub fn get(&self, parameter: Parameter) -> Option<Estimate> {
         self.estimates.iter().find(|(p, _)| *p == parameter).map(|(_, e)| *e)
     }
+}
+
+/// Returns the source of nuclei that all fields have.
+pub(crate) fn nuclei_from(fields: &[FieldImage]) -> NucleiFrom {
+    fields.iter().map(|field| NucleiFrom::of(&field.nuclei)).min().unwrap_or_default()
 }
 
 /// Light and noise of one field.
@@ -90,6 +96,12 @@ pub fn measure(fields: &[FieldImage], pixel_um: f64) -> Result<Measured, Error> 
 /// # Errors
 /// As `measure`; [`Error::Stopped`] if the stop flag is set.
 pub fn measure_with(fields: &[FieldImage], pixel_um: f64, control: &Control) -> Result<Measured, Error> {
+    measure_in(fields, pixel_um, &control.phase("measuring fields", fields.len()))
+}
+
+/// As [`measure_with`], with one step of a phase per field.
+pub(crate) fn measure_in(fields: &[FieldImage], pixel_um: f64, phase: &Phase) -> Result<Measured, Error> {
+    let control = phase.control();
     let first = fields.first().ok_or(Error::NoField)?;
     let size_px = [first.width, first.height()];
     for field in fields {
@@ -109,12 +121,9 @@ pub fn measure_with(fields: &[FieldImage], pixel_um: f64, control: &Control) -> 
             ));
         }
     }
-    // Annotated points are often incomplete, while simulated windows have all nuclei.
-    let masks = fields.iter().all(|field| NucleiFrom::of(&field.nuclei) == NucleiFrom::Masks);
-    let nuclei_from = if masks { NucleiFrom::Masks } else { NucleiFrom::Search };
-    let view = WindowSampler::new(size_px, pixel_um, nuclei_from)?;
+    let nuclei_from = nuclei_from(fields);
+    let view = Sampler::new(size_px, pixel_um, nuclei_from, Detail::Statistics)?;
     let scale = f64::from(first.full_scale);
-    let phase = control.phase("measuring fields", fields.len());
     let one = |field: &FieldImage| -> Result<Light, Error> {
         let light = light(field, &view, control)?;
         phase.step()?;
@@ -151,7 +160,7 @@ pub fn measure_with(fields: &[FieldImage], pixel_um: f64, control: &Control) -> 
         for (parameter, values) in
             [(Parameter::NoiseCorrelationX, &correlations[0]), (Parameter::NoiseCorrelationY, &correlations[1])]
         {
-            let [low, high] = min_max(values);
+            let [low, high] = min_max(values.iter().copied());
             put(parameter, values, CORRELATION_ERROR + ADDED_CORRELATION * added + 0.25 * (high - low));
         }
     }
@@ -161,45 +170,50 @@ pub fn measure_with(fields: &[FieldImage], pixel_um: f64, control: &Control) -> 
         let half = of_mean(deviation(&noise), noise.len()) + NOISE_ERROR + added;
         let prior = Parameter::Noise.prior();
         let [value, mut low, high] = [0.0, -half, half].map(|d| libm::exp(mean(&noise) + d));
-        low = low.min(libm::exp(min_max(&noise)[0] - NOISE_ERROR));
+        low = low.min(libm::exp(min_max(noise.iter().copied())[0] - NOISE_ERROR));
         estimates.push((
             Parameter::Noise,
             Estimate { value, low: low.max(prior.low).min(value), high: high.min(prior.high).max(value) },
         ));
     }
-    if levels.len() > 1 {
-        let sd = deviation(&levels);
-        let [low, high] = of_deviation(levels.len()).map(|factor| factor * sd);
-        let most = Parameter::LevelSd.prior().high;
-        estimates.push((
-            Parameter::LevelSd,
-            Estimate { value: sd, low: (low - level_error).max(0.0), high: (high + level_error).min(most.max(sd)) },
-        ));
-    }
-    let [sd_across, sd_down] = [deviation(&column(&|l| l.across)), deviation(&column(&|l| l.down))];
     let squares = mean(&column(&|l| l.level * l.level)) * scale * scale;
     let restored = mean(&column(&|l| l.empty.restored()));
+    let of_fields: Vec<Vec<(Parameter, f64)>> = lights
+        .iter()
+        .map(|l| {
+            vec![
+                (Parameter::Level, l.level),
+                (Parameter::FalloffX, l.across.max(0.0)),
+                (Parameter::FalloffY, l.down.max(0.0)),
+                (Parameter::Noise, l.empty.deviation * LEVELS / scale),
+            ]
+        })
+        .collect();
     let relative: Vec<Vec<f32>> = lights.into_iter().map(|l| l.empty.relative).collect();
     if let Some([variance, error]) = pattern(&relative, control)?.map(|found| found.map(|v| v * restored)) {
         let per_noise = squares / mean(&variances);
         let half = (2.0 * error + PATTERN_ERROR * variance.abs()) * per_noise;
         let [value, low, mut high] = [0.0, -half, half].map(|d| (variance * per_noise + d).clamp(0.0, 1.0));
         // Relative to the noise of the cleanest field the pattern is larger.
-        high = (high * (mean(&variances) / min_max(&variances)[0] + added)).clamp(value, 1.0);
+        high = (high * (mean(&variances) / min_max(variances.iter().copied())[0] + added)).clamp(value, 1.0);
         estimates.push((Parameter::Pattern, Estimate { value, low, high }));
     }
     estimates.sort_by_key(|(parameter, _)| *parameter);
-    let or_default = |sd: f64, default: f64| if sd.is_finite() { sd } else { default };
-    let usual = FieldSd::default();
-    let field_sd = FieldSd {
-        falloff_x: or_default(sd_across, usual.falloff_x),
-        falloff_y: or_default(sd_down, usual.falloff_y),
-        noise: or_default(deviation(&noise), usual.noise),
-    };
-    Ok(Measured { size_px, bits: bits(fields), extended, nuclei_from, estimates, field_sd })
+    let mean_of = |parameter: Parameter| estimates.iter().find(|(p, _)| *p == parameter).map(|(_, e)| e.value);
+    let of_fields = of_fields
+        .into_iter()
+        .map(|values| {
+            let known = |(p, value): (Parameter, f64)| {
+                let value = if value.is_finite() { Some(value) } else { mean_of(p) };
+                Some((p, value?.clamp(p.prior().low, p.prior().high)))
+            };
+            values.into_iter().filter_map(known).collect()
+        })
+        .collect();
+    Ok(Measured { size_px, bits: bits(fields), extended, nuclei_from, estimates, fields: of_fields })
 }
 
-fn light(field: &FieldImage, view: &WindowSampler, control: &Control) -> Result<Light, Error> {
+fn light(field: &FieldImage, view: &Sampler, control: &Control) -> Result<Light, Error> {
     let s = view.measurer.measure_with(field, control)?.statistics;
     control.check()?;
     let (across, down) = (-s.background_x2, -s.background_y2);
@@ -244,20 +258,6 @@ fn of_mean(sd: f64, count: usize) -> f64 {
     student(count.saturating_sub(1)) * sd / (count.max(1) as f64).sqrt()
 }
 
-/// Returns the 95 % interval of an estimated standard deviation of 1, from the approximation of χ² by Wilson and
-/// Hilferty (doi:10.1073/pnas.17.12.684).
-fn of_deviation(count: usize) -> [f64; 2] {
-    let n = count.saturating_sub(1) as f64;
-    if n < 1.0 {
-        return [0.0, f64::INFINITY];
-    }
-    let chi2 = |z: f64| {
-        let root = 1.0 - 2.0 / (9.0 * n) + z * (2.0 / (9.0 * n)).sqrt();
-        n * (root * root * root).max(1e-3)
-    };
-    [NORMAL, -NORMAL].map(|z| (n / chi2(z)).sqrt())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -277,12 +277,5 @@ mod tests {
     fn quantiles_equal_published_tables() {
         assert!((student(30) - 2.042).abs() < 0.002, "{}", student(30));
         assert!((student(11) - 2.201).abs() < 0.003, "{}", student(11));
-        // χ² with 7 degrees of freedom: 1.690 and 16.013.
-        let [low, high] = of_deviation(8);
-        assert!(
-            (low - (7.0_f64 / 16.013).sqrt()).abs() < 0.01 && (high - (7.0_f64 / 1.690).sqrt()).abs() < 0.05,
-            "{low} {high}"
-        );
-        assert_eq!(of_deviation(1)[1], f64::INFINITY);
     }
 }

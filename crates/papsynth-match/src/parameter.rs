@@ -22,6 +22,16 @@ pub enum Source {
     Simulated,
 }
 
+/// What shares a value of a parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Level {
+    /// Each field has a value of its own.
+    Field,
+    /// All fields share one value.
+    All,
+}
+
 /// Prior range of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
@@ -37,10 +47,12 @@ pub struct Prior {
     pub scale: Scale,
     /// Method.
     pub source: Source,
+    /// What shares a value.
+    pub level: Level,
 }
 
 macro_rules! parameters {
-    ($($(#[$doc:meta])* $name:ident: $source:ident, $scale:ident $low:literal..$high:literal $unit:literal, $path:literal;)*) => {
+    ($($(#[$doc:meta])* $name:ident: $source:ident, $level:ident, $scale:ident $low:literal..$high:literal $unit:literal, $path:literal;)*) => {
         /// A parameter of a match.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
         #[serde(rename_all = "kebab-case")]
@@ -57,7 +69,13 @@ macro_rules! parameters {
             pub fn prior(self) -> Prior {
                 match self {
                     $(Self::$name => Prior {
-                        path: $path, unit: $unit, low: $low, high: $high, scale: Scale::$scale, source: Source::$source,
+                        path: $path,
+                        unit: $unit,
+                        low: $low,
+                        high: $high,
+                        scale: Scale::$scale,
+                        source: Source::$source,
+                        level: Level::$level,
                     },)*
                 }
             }
@@ -66,78 +84,80 @@ macro_rules! parameters {
 }
 
 parameters! {
-    /// Mean light of the empty slide, fraction of full scale, after the mean loss by the background texture.
-    Level: Measured, Linear 0.55..1.0 "", "background.level: mean light";
-    /// Standard deviation of the level between fields.
-    LevelSd: Measured, Linear 0.0..0.04 "", "background.level: sd";
+    /// Light of the empty slide, fraction of full scale, after the mean loss by the background texture.
+    Level: Measured, Field, Linear 0.55..1.0 "", "background.level";
     /// Fall-off of the light towards the left and right border.
-    FalloffX: Measured, Linear 0.0..0.12 "", "background.illumination.falloff_x: mean";
+    FalloffX: Measured, Field, Linear 0.0..0.12 "", "background.illumination.falloff_x";
     /// Fall-off of the light towards the upper and lower border.
-    FalloffY: Measured, Linear 0.0..0.12 "", "background.illumination.falloff_y: mean";
+    FalloffY: Measured, Field, Linear 0.0..0.12 "", "background.illumination.falloff_y";
     /// Standard deviation of noise of the empty slide, grey levels of 255.
-    Noise: Measured, Logarithmic 0.5..6.0 "dn", "camera.full_well_e, camera.read_noise_e: noise of the empty slide";
+    Noise: Measured, Field, Logarithmic 0.5..6.0 "dn", "camera.full_well_e, camera.read_noise_e: noise of the empty slide";
     /// Fraction of the noise variance that is the same in all images.
-    Pattern: Measured, Linear 0.0..0.8 "", "camera.prnu: part of the variance of noise";
+    Pattern: Simulated, All, Linear 0.0..0.8 "", "camera.prnu: part of the variance of noise";
     /// Correlation of noise with the next pixel of the row, in fused images.
-    NoiseCorrelationX: Measured, Linear 0.0..0.45 "", "focus.noise_correlation_x";
+    NoiseCorrelationX: Measured, All, Linear 0.0..0.45 "", "focus.noise_correlation_x";
     /// Correlation of noise with the next pixel of the column, in fused images.
-    NoiseCorrelationY: Measured, Linear 0.0..0.45 "", "focus.noise_correlation_y";
+    NoiseCorrelationY: Measured, All, Linear 0.0..0.45 "", "focus.noise_correlation_y";
     /// Pixel size; sought on request only.
-    Pixel: Simulated, Logarithmic 0.15..0.75 "um", "field.pixel_um";
+    Pixel: Simulated, All, Logarithmic 0.15..0.75 "um", "field.pixel_um";
     /// Fraction of photon noise in the noise variance of the empty slide, without the fixed pattern.
-    Photons: Simulated, Linear 0.05..0.95 "", "camera.full_well_e, camera.read_noise_e: part of photons";
-    /// Blur beyond diffraction, median over fields.
-    Blur: Simulated, Logarithmic 0.08..0.9 "um", "optics.extra_blur_um: median";
-    /// Standard deviation of the logarithm of the blur between fields.
-    BlurSd: Simulated, Linear 0.0..0.4 "", "optics.extra_blur_um: log sd";
+    Photons: Simulated, All, Linear 0.05..0.95 "", "camera.full_well_e, camera.read_noise_e: part of photons";
+    /// Blur beyond diffraction.
+    Blur: Simulated, Field, Logarithmic 0.08..0.9 "um", "optics.extra_blur_um";
     /// Depth range of cells.
-    Depth: Simulated, Logarithmic 0.5..12.0 "um", "slide.depth_um";
-    /// Stain of the cytoplasm of a field, median over fields.
-    FieldCytoplasm: Simulated, Logarithmic 0.35..2.5 "", "stain.field_cytoplasm: median";
-    /// Standard deviation of the logarithm of this stain between fields.
-    FieldCytoplasmSd: Simulated, Linear 0.02..0.7 "", "stain.field_cytoplasm: log sd";
-    /// Stain of the nuclei of a field, median over fields.
-    FieldNucleus: Simulated, Logarithmic 0.35..2.0 "", "stain.field_nucleus: median";
-    /// Standard deviation of the logarithm of this stain between fields.
-    FieldNucleusSd: Simulated, Linear 0.02..0.4 "", "stain.field_nucleus: log sd";
-    /// Contrast of chromatin, median over fields.
-    Texture: Simulated, Logarithmic 0.15..2.5 "", "stain.field_texture: median";
-    /// Standard deviation of the logarithm of this contrast between fields.
-    TextureSd: Simulated, Linear 0.02..0.7 "", "stain.field_texture: log sd";
-    /// Standard deviation of the logarithm of the stain of cytoplasm between cells, in addition to that of the model.
-    CellCytoplasm: Simulated, Linear 0.0..0.7 "", "cells.*.cytoplasm_stain: log sd";
-    /// Standard deviation of the logarithm of the stain of nuclei between cells, in addition to that of the model.
-    CellNucleus: Simulated, Linear 0.0..0.4 "", "cells.*.nucleus_stain: log sd";
+    Depth: Simulated, All, Logarithmic 0.5..12.0 "um", "slide.depth_um";
+    /// Stain of the cytoplasm of a field.
+    FieldCytoplasm: Simulated, Field, Logarithmic 0.35..2.5 "", "stain.field_cytoplasm";
+    /// Stain of the nuclei of a field.
+    FieldNucleus: Simulated, Field, Logarithmic 0.35..2.0 "", "stain.field_nucleus";
+    /// Contrast of chromatin.
+    Texture: Simulated, Field, Logarithmic 0.1..2.5 "", "stain.field_texture";
+    /// Factor on the standard deviation of the absorbance of cytoplasm between cells.
+    CytoplasmVariation: Simulated, All, Linear 0.0..2.5 "", "stain.cytoplasm_variation";
+    /// Factor on the standard deviations of absorbance and texture between nuclei.
+    NucleusVariation: Simulated, All, Linear 0.0..2.5 "", "stain.nucleus_variation";
     /// Domed fraction of the thickness of a nucleus.
-    Dome: Simulated, Linear 0.0..1.0 "", "nucleus.dome: mean";
+    Dome: Simulated, Field, Linear 0.0..1.0 "", "nucleus.dome: mean";
     /// Absorbance of the rim of nuclei over that of the inside.
-    Rim: Simulated, Linear 0.0..0.4 "", "nucleus.rim: mean";
+    Rim: Simulated, All, Linear 0.0..0.4 "", "nucleus.rim: mean";
+    /// Softness of the edges of nuclei.
+    Edge: Simulated, Field, Linear 0.0..1.0 "um", "nucleus.edge_um: mean";
+    /// Clumping of chromatin.
+    Clumping: Simulated, All, Linear 0.0..1.0 "", "nucleus.clumping: mean";
+    /// Fraction of nuclei that are small, dark and without structure.
+    Pyknotic: Simulated, Field, Linear 0.0..0.3 "", "nucleus.pyknotic";
+    /// Width of the border in which cells become thin.
+    CellEdge: Simulated, Field, Logarithmic 0.8..8.0 "um", "cytoplasm.rim_um";
     /// Strength of the structures of the cytoplasm, relative to the initial recipe.
-    Structure: Simulated, Logarithmic 0.2..3.0 "", "cytoplasm.clouds, flecks, cytoskeleton, grain: factor";
-    /// Number of cells, median over fields.
-    Cells: Simulated, Logarithmic 40.0..700.0 "/mm2", "cells.*.count: median";
-    /// Standard deviation of the logarithm of the number of cells between fields.
-    CellsSd: Simulated, Linear 0.05..0.9 "", "cells.*.count: log sd";
+    Structure: Simulated, Field, Logarithmic 0.2..3.0 "", "cytoplasm.clouds, flecks, cytoskeleton, grain: factor";
+    /// Number of cells.
+    Cells: Simulated, Field, Logarithmic 40.0..700.0 "/mm2", "cells.*.count: all classes";
     /// Fraction of superficial cells among superficial and intermediate cells.
-    Superficial: Simulated, Linear 0.02..0.98 "", "cells.superficial.count: share";
+    Superficial: Simulated, Field, Linear 0.02..0.98 "", "cells.superficial.count: share";
+    /// Fraction of cells of the classes of lesions among all cells.
+    Lesion: Simulated, Field, Linear 0.02..0.98 "", "cells.*.count: share of lesions";
     /// Factor on the size of cells and nuclei.
-    Size: Simulated, Logarithmic 0.6..1.6 "", "cells.*.size";
+    Size: Simulated, Field, Logarithmic 0.6..1.6 "", "cells.*.size";
+    /// Factor on the standard deviation of the logarithm of sizes.
+    SizeVariation: Simulated, All, Linear 0.0..2.0 "", "cells.*.size_variation";
+    /// Additional factor on the size of nuclei.
+    NucleusSize: Simulated, Field, Logarithmic 0.6..1.6 "", "cells.*.nucleus_size";
     /// Radius of clusters of cells.
-    ClusterRadius: Simulated, Logarithmic 8.0..80.0 "um", "layout.radius_um";
+    ClusterRadius: Simulated, All, Logarithmic 8.0..80.0 "um", "layout.radius_um";
     /// Weight of positions outside clusters.
-    Outside: Simulated, Logarithmic 0.01..1.0 "", "layout.outside";
+    Outside: Simulated, All, Logarithmic 0.01..1.0 "", "layout.outside";
     /// Clusters of leukocytes.
-    Leukocytes: Simulated, Logarithmic 3.0..400.0 "/mm2", "debris.leukocytes.clusters: median";
+    Leukocytes: Simulated, Field, Logarithmic 3.0..400.0 "/mm2", "debris.leukocytes.clusters";
     /// Clusters of bacilli.
-    Bacilli: Simulated, Logarithmic 3.0..400.0 "/mm2", "debris.bacilli.clusters: median";
+    Bacilli: Simulated, Field, Logarithmic 3.0..400.0 "/mm2", "debris.bacilli.clusters";
     /// Specks.
-    Speckles: Simulated, Logarithmic 6.0..2000.0 "/mm2", "debris.speckles.count: median";
+    Speckles: Simulated, Field, Logarithmic 6.0..2000.0 "/mm2", "debris.speckles.count";
     /// Amorphous clumps.
-    Smudges: Simulated, Logarithmic 6.0..800.0 "/mm2", "debris.smudges.count: median";
+    Smudges: Simulated, Field, Logarithmic 6.0..800.0 "/mm2", "debris.smudges.count";
     /// Clusters of faint dirt.
-    Dirt: Simulated, Logarithmic 12.0..1500.0 "/mm2", "debris.dirt.clusters: median";
+    Dirt: Simulated, Field, Logarithmic 12.0..1500.0 "/mm2", "debris.dirt.clusters";
     /// Strength of the background texture.
-    BackgroundTexture: Simulated, Logarithmic 0.002..0.06 "", "background.texture: mean";
+    BackgroundTexture: Simulated, Field, Logarithmic 0.002..0.06 "", "background.texture";
 }
 
 impl Parameter {
@@ -164,6 +184,15 @@ impl Prior {
         }
     }
 
+    /// Returns a difference on the scale of the parameter for a difference of positions.
+    #[must_use]
+    pub fn difference(&self, places: f64) -> f64 {
+        match self.scale {
+            Scale::Linear => places * (self.high - self.low),
+            Scale::Logarithmic => places * libm::log(self.high / self.low),
+        }
+    }
+
     /// Returns the value at a position.
     #[must_use]
     pub fn value(&self, place: f64) -> f64 {
@@ -174,26 +203,45 @@ impl Prior {
     }
 }
 
-/// A value for each parameter.
+/// A value for each parameter, with a standard deviation around it on the scale of the parameter: of the logarithm for
+/// a logarithmic one.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Values(pub(crate) [f64; PARAMETERS.len()]);
+pub struct Values {
+    values: [f64; PARAMETERS.len()],
+    spreads: [f64; PARAMETERS.len()],
+}
 
 impl Values {
-    /// Returns the values at these positions in their ranges.
+    /// Returns the values at these positions in their ranges, without spread.
     #[must_use]
     pub fn at(places: &[f64; PARAMETERS.len()]) -> Self {
-        Self(std::array::from_fn(|i| PARAMETERS[i].prior().value(places[i])))
+        Self { values: std::array::from_fn(|i| PARAMETERS[i].prior().value(places[i])), ..Self::zero() }
+    }
+
+    pub(crate) fn zero() -> Self {
+        Self { values: [0.0; PARAMETERS.len()], spreads: [0.0; PARAMETERS.len()] }
     }
 
     /// Returns the value of a parameter.
     #[must_use]
     pub fn get(&self, parameter: Parameter) -> f64 {
-        self.0[parameter.index()]
+        self.values[parameter.index()]
+    }
+
+    /// Returns the standard deviation around the value of a parameter.
+    #[must_use]
+    pub fn spread(&self, parameter: Parameter) -> f64 {
+        self.spreads[parameter.index()]
     }
 
     /// Sets the value of a parameter.
     pub fn set(&mut self, parameter: Parameter, value: f64) {
-        self.0[parameter.index()] = value;
+        self.values[parameter.index()] = value;
+    }
+
+    /// Sets the standard deviation around the value of a parameter.
+    pub fn set_spread(&mut self, parameter: Parameter, spread: f64) {
+        self.spreads[parameter.index()] = spread;
     }
 }
 

@@ -1,13 +1,12 @@
-//! Statistics of windows for the regressions.
+//! Statistics of images for the regressions.
 
 use papsynth_judge::number::{single, whole};
 use papsynth_judge::{Control, FeatureTable, Field, FieldImage, Statistics};
-use rayon::prelude::*;
 
 use crate::error::Error;
 use crate::noise;
-use crate::view::WindowSampler;
-use portable_numerics::statistics::{deviation, mean, quantile};
+use crate::sampler::Sampler;
+use portable_numerics::statistics::{mean, quantile};
 
 /// Transform of a feature.
 #[derive(Clone, Copy)]
@@ -29,6 +28,9 @@ impl Transform {
 
 /// Identifier and transform of a feature.
 type Feature = (&'static str, Transform);
+
+/// Statistic of nuclear area: median of its logarithm.
+pub(crate) const NUCLEAR_AREA: &str = "nuclei: nucleus area, um2";
 
 /// Features of nuclei.
 const NUCLEI: [Feature; 25] = [
@@ -59,19 +61,6 @@ const NUCLEI: [Feature; 25] = [
     ("nucleus eccentricity", Transform::Identity),
 ];
 
-/// Features of nuclei with separate standard deviations within windows and between windows.
-const NUCLEI_APART: [Feature; 5] = [
-    ("core above surroundings", Transform::Log(0.02)),
-    ("core sd over contrast", Transform::Log(0.01)),
-    ("core sd without trend", Transform::Log(0.002)),
-    ("rim sigma, px", Transform::Log(0.0)),
-    ("absorbance beside", Transform::Log(0.01)),
-];
-
-/// Features of free cells with separate standard deviations.
-const CELLS_APART: [Feature; 2] =
-    [("cytoplasm absorbance", Transform::Log(0.005)), ("cell area, um2", Transform::Log(0.0))];
-
 /// Distances of counted pairs of nuclei, µm.
 const PAIRS_UM: [f64; 5] = [8.0, 16.0, 33.0, 66.0, 130.0];
 
@@ -98,18 +87,7 @@ const TAILS: [f64; 8] = [0.05, 0.09, 0.15, 0.21, 0.31, 0.41, 0.61, 0.81];
 /// Minimum number of nuclei or cells for a median.
 const LEAST: usize = 4;
 
-/// Measurements of a window.
-#[derive(Debug, Clone)]
-pub(crate) struct Window {
-    /// Statistics of the complete window.
-    whole: Vec<(String, f64)>,
-    nuclei: FeatureTable,
-    cells: FeatureTable,
-    /// Pairs of nuclei within each of [`PAIRS_UM`], and the expected number for random positions.
-    pairs: [[f64; 2]; PAIRS_UM.len()],
-}
-
-/// Returns the scalars of the statistics of a window.
+/// Returns the scalars of the statistics of an image.
 fn scalars(s: &Statistics) -> Vec<(&'static str, f64)> {
     let ripley = s.ripley.map(|k| Transform::Log(0.1).of(k));
     vec![
@@ -136,57 +114,94 @@ fn scalars(s: &Statistics) -> Vec<(&'static str, f64)> {
     ]
 }
 
-/// Statistics of the complete window with a standard deviation between windows.
-const WITH_SD: [&str; 13] = [
-    "log noise",
-    "log coverage",
-    "log absorbance of what is covered",
-    "log range of absorbance of what is covered",
-    "log edge sigma p10",
-    "log edge sigma p50",
-    "log nuclei",
-    "log power, ring 4",
-    "log power, ring 9",
-    "log power, ring 11",
-    "fraction above 0.15",
-    "fraction above 0.41",
-    "log fraction of overlaps",
-];
+/// Statistics of an image; NaN if unknown.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Summary {
+    /// Names of the statistics.
+    pub names: Vec<String>,
+    /// Values of the statistics.
+    pub values: Vec<f64>,
+    /// Number of nuclei in the image.
+    pub nuclei: usize,
+}
 
-impl Window {
-    pub(crate) fn new(image: &FieldImage, view: &WindowSampler, control: &Control) -> Result<Self, Error> {
-        let Field { statistics: s, nuclei, cells, .. } = view.measurer.measure_with(image, control)?;
+impl Summary {
+    /// Measures an image.
+    ///
+    /// # Errors
+    /// If the image is invalid; [`Error::Stopped`] if the stop flag is set.
+    pub fn of(image: &FieldImage, sampler: &Sampler, control: &Control) -> Result<Self, Error> {
+        let field = sampler.measurer.measure_with(image, control)?;
         control.check()?;
+        Self::of_field(&field, image, sampler, control)
+    }
+
+    /// As [`of`](Self::of), for an image that is measured already.
+    pub(crate) fn of_field(
+        field: &Field,
+        image: &FieldImage,
+        sampler: &Sampler,
+        control: &Control,
+    ) -> Result<Self, Error> {
+        let Field { statistics: s, nuclei, cells, .. } = field;
         let (grey, width) = (&image.grey, image.width);
         let empty = s.background_dn * f64::from(image.full_scale) / crate::recipe::LEVELS;
+        let mut all = Self { names: Vec::new(), values: Vec::new(), nuclei: nuclei.len() };
+        for (name, value) in scalars(s) {
+            all.put(name, value);
+        }
+        for (i, power) in s.spectrum.iter().enumerate() {
+            all.put(format!("log power, ring {i}"), *power);
+        }
+        for a in TAILS {
+            all.put(format!("fraction above {a}"), Transform::Log(0.002).of(tail(&s.histogram, a)));
+        }
+        for (i, noise) in (1..).zip(noise::noise_by_darkness(grey, width, empty)) {
+            all.put(format!("noise in the dark, bin {i}"), noise);
+        }
         let [fine, coarse] = noise::unevenness(grey, width, empty);
-        let named = |(name, value): (&str, f64)| (name.to_owned(), value);
-        let mut whole: Vec<(String, f64)> = scalars(&s).into_iter().map(named).collect();
-        whole.extend(s.spectrum.iter().enumerate().map(|(i, power)| (format!("log power, ring {i}"), *power)));
-        whole.extend(TAILS.map(|a| (format!("fraction above {a}"), Transform::Log(0.002).of(tail(&s.histogram, a)))));
-        let dark = (1..).zip(noise::noise_by_darkness(grey, width, empty));
-        whole.extend(dark.map(|(i, noise)| (format!("noise in the dark, bin {i}"), noise)));
-        whole.push(("unevenness of the light, finely".to_owned(), fine));
-        whole.push(("unevenness of the light, coarsely".to_owned(), coarse));
+        all.put("unevenness of the light, finely", fine);
+        all.put("unevenness of the light, coarsely", coarse);
         control.check()?;
-        whole.extend(noise::counts(grey, width, single(empty)));
-        let pairs = PAIRS_UM.map(|um| pairs(&nuclei.places, image, um / view.pixel_um));
-        Ok(Self { whole, nuclei, cells, pairs })
+        for (name, value) in noise::counts(grey, width, single(empty)) {
+            all.put(name, value);
+        }
+        all.put_objects("nuclei", nuclei, &NUCLEI);
+        for um in PAIRS_UM {
+            let [found, expected] = pairs(&nuclei.places, image, um / sampler.pixel_um);
+            all.put(format!("pairs of nuclei within {um} um"), libm::log((found + 1.0) / (expected + 1.0)));
+        }
+        all.put_objects("cells", cells, &CELLS);
+        Ok(all)
     }
 
-    /// Measures several images in parallel.
-    pub(crate) fn all(images: &[FieldImage], view: &WindowSampler, control: &Control) -> Result<Vec<Self>, Error> {
-        let phase = control.phase("measuring windows", images.len());
-        let one = |image: &FieldImage| -> Result<Self, Error> {
-            let window = Self::new(image, view, control)?;
-            phase.step()?;
-            Ok(window)
-        };
-        images.par_iter().map(one).collect::<Vec<_>>().into_iter().collect()
+    /// Returns the mean of several summaries of one field: of its known values.
+    pub(crate) fn mean(parts: &[Self]) -> Self {
+        let one =
+            |i: usize| mean(&parts.iter().map(|part| part.values[i]).filter(|v| v.is_finite()).collect::<Vec<f64>>());
+        let names = parts.first().map_or(Vec::new(), |part| part.names.clone());
+        let values = (0..names.len()).map(one).collect();
+        Self { names, values, nuclei: parts.iter().map(|part| part.nuclei).sum() }
     }
 
-    pub(crate) fn nuclei(&self) -> usize {
-        self.nuclei.len()
+    fn put(&mut self, name: impl Into<String>, value: f64) {
+        self.names.push(name.into());
+        self.values.push(value);
+    }
+
+    /// Adds median and robust standard deviation (0.741 times the interquartile range) of features of objects.
+    fn put_objects(&mut self, kind: &str, table: &FeatureTable, features: &[Feature]) {
+        for (name, scale) in features {
+            let mut values: Vec<f64> = table.column(name).map(|v| scale.of(v)).collect();
+            let [middle, spread] = if values.len() < LEAST {
+                [f64::NAN; 2]
+            } else {
+                let [low, middle, high] = [0.25, 0.5, 0.75].map(|q| quantile(&mut values, q));
+                [middle, 0.741 * (high - low)]
+            };
+            self.put(format!("{kind}: {name}"), middle);
+            self.put(format!("{kind}: {name}, sd"), Transform::Log(0.003).of(spread));
+        }
     }
 }
 
@@ -207,90 +222,4 @@ fn pairs(places: &[[f64; 2]], image: &FieldImage, within_px: f64) -> [f64; 2] {
 fn tail(histogram: &[f64], above: f64) -> f64 {
     let from = whole((above - papsynth_judge::HISTOGRAM_FROM) / papsynth_judge::HISTOGRAM_STEP + 0.5);
     histogram.iter().skip(from).sum()
-}
-
-/// Statistics of several windows of one microscope; NaN if unknown.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Summary {
-    /// Names of the statistics.
-    pub names: Vec<String>,
-    /// Values of the statistics.
-    pub values: Vec<f64>,
-}
-
-impl Summary {
-    /// Measures windows of fields.
-    ///
-    /// # Errors
-    /// If an image is invalid.
-    pub fn of(images: &[FieldImage], view: &WindowSampler) -> Result<Self, Error> {
-        Ok(Self::new(&Window::all(images, view, &Control::NONE)?))
-    }
-
-    pub(crate) fn new(windows: &[Window]) -> Self {
-        let mut all = Self { names: Vec::new(), values: Vec::new() };
-        for (i, (name, _)) in windows.first().into_iter().flat_map(|w| &w.whole).enumerate() {
-            let known: Vec<f64> = windows.iter().map(|w| w.whole[i].1).filter(|v| v.is_finite()).collect();
-            all.put(name.clone(), mean(&known));
-            if WITH_SD.contains(&name.as_str()) {
-                all.put(format!("{name}, sd"), Transform::Log(0.01).of(deviation(&known)));
-            }
-        }
-        let nuclei: Vec<&FeatureTable> = windows.iter().map(|w| &w.nuclei).collect();
-        all.put_objects("nuclei", &nuclei, &NUCLEI, &NUCLEI_APART);
-        for (i, um) in PAIRS_UM.iter().enumerate() {
-            let [found, expected] = [0, 1].map(|k| windows.iter().map(|w| w.pairs[i][k]).sum::<f64>());
-            all.put(format!("pairs of nuclei within {um} um"), libm::log((found + 1.0) / (expected + 1.0)));
-        }
-        let cells: Vec<&FeatureTable> = windows.iter().map(|w| &w.cells).collect();
-        all.put_objects("cells", &cells, &CELLS, &CELLS_APART);
-        all
-    }
-
-    fn put(&mut self, name: String, value: f64) {
-        self.names.push(name);
-        self.values.push(value);
-    }
-
-    /// Adds features of objects of one kind: over all windows, and within and between windows.
-    fn put_objects(&mut self, kind: &str, tables: &[&FeatureTable], features: &[Feature], separate: &[Feature]) {
-        for (name, scale) in features {
-            let [middle, spread] = pooled(tables, name, *scale);
-            self.put(format!("{kind}: {name}"), middle);
-            self.put(format!("{kind}: {name}, sd"), Transform::Log(0.003).of(spread));
-        }
-        for (name, scale) in separate {
-            let [within, between] = apart(tables, name, *scale);
-            self.put(format!("{kind}: {name}, within windows"), Transform::Log(0.01).of(within));
-            self.put(format!("{kind}: {name}, between windows"), Transform::Log(0.02).of(between));
-        }
-    }
-}
-
-/// Returns median and robust standard deviation (0.741 times the interquartile range) of a feature over all tables.
-fn pooled(tables: &[&FeatureTable], name: &str, scale: Transform) -> [f64; 2] {
-    let mut values: Vec<f64> = tables.iter().flat_map(|t| t.column(name)).map(|v| scale.of(v)).collect();
-    if values.len() < LEAST {
-        return [f64::NAN; 2];
-    }
-    let [low, middle, high] = [0.25, 0.5, 0.75].map(|q| quantile(&mut values, q));
-    [middle, 0.741 * (high - low)]
-}
-
-/// Returns the standard deviation within tables, and that between their means, corrected for the variation within.
-fn apart(tables: &[&FeatureTable], name: &str, scale: Transform) -> [f64; 2] {
-    let known = tables.iter().map(|t| t.column(name).map(|v| scale.of(v)).collect::<Vec<f64>>());
-    let groups: Vec<Vec<f64>> = known.filter(|v| v.len() >= 2).collect();
-    if groups.is_empty() {
-        return [f64::NAN; 2];
-    }
-    let rest: f64 = groups.iter().map(|g| deviation(g) * deviation(g) * (g.len() - 1) as f64).sum();
-    let freedom: f64 = groups.iter().map(|g| (g.len() - 1) as f64).sum();
-    let variance = rest / freedom;
-    if groups.len() < 3 {
-        return [variance.sqrt(), f64::NAN];
-    }
-    let means: Vec<f64> = groups.iter().map(|g| mean(g)).collect();
-    let chance: Vec<f64> = groups.iter().map(|g| variance / g.len() as f64).collect();
-    [variance.sqrt(), (deviation(&means) * deviation(&means) - mean(&chance)).max(0.0).sqrt()]
 }

@@ -4,6 +4,7 @@ use papsynth::recipe::{CellMix, RECIPE_VERSION, Recipe, is_toml_table, toml_valu
 use serde_json::Value;
 
 use crate::fit::{Fit, Origin, ParameterFit};
+use crate::parameter::Scale;
 use crate::recipe::rounded_to;
 
 /// Significant digits of values in comments.
@@ -11,23 +12,35 @@ const DIGITS: i32 = 3;
 
 impl Fit {
     /// Returns the recipe as TOML, without default values, and with value, interval and origin of each parameter as
-    /// comments.
+    /// comments. Each real field has a condition.
     #[must_use]
     pub fn to_toml(&self) -> String {
         let json = |recipe: &Recipe| serde_json::to_value(recipe).unwrap_or_default();
         let mut out = self.heading();
         out.push_str(&format!("version = {RECIPE_VERSION}\n"));
-        let (recipe, default) = (json(&self.recipe), json(&Recipe::default()));
+        let (recipe, default) = (json(&self.recipe.without_conditions()), json(&Recipe::default()));
         self.table(&mut out, "", &recipe, &default);
+        for (name, condition) in self.fields.iter().zip(&self.recipe.conditions) {
+            // A name may hold a line break.
+            let name: String = name.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+            out.push_str(&format!("\n# As in {name}\n[[conditions]]\n[conditions.numbers]\n"));
+            for (path, value) in &condition.numbers {
+                let value = serde_json::to_value(value).unwrap_or_default();
+                out.push_str(&format!("{path:?} = {}\n", toml_value(&value)));
+            }
+        }
         out
     }
 
     fn heading(&self) -> String {
-        let Self { fields, windows, nuclei, distance, .. } = self;
+        let Self { fields, nuclei, distance, .. } = self;
         let mut out = format!(
-            "# Matched to {fields} fields: {windows} windows with {nuclei} nuclei. Numbers in brackets are 95 % intervals.\n\
-             # Distance of simulated windows from the real ones, in standard errors: {:.2} before, {:.2} after.\n",
-            distance.before, distance.after
+            "# Matched to {} fields with {nuclei} nuclei. Numbers in brackets are 95 % intervals of the mean over fields.\n\
+             # Distance of simulated fields from the real ones, in standard deviations between fields: {:.2} before, {:.2} after.\n\
+             # Each slide has the conditions of one of the fields, with a spread around them: see the end.\n",
+            fields.len(),
+            distance.before,
+            distance.after
         );
         if self.extended {
             out.push_str(
@@ -35,9 +48,9 @@ impl Fit {
             );
         }
         let lost: Vec<&str> =
-            self.parameters.iter().filter(|a| a.origin == Origin::NotIdentified).map(|a| a.path).collect();
+            self.parameters.iter().filter(|a| a.origin == Origin::NotVisible).map(|a| a.path).collect();
         if !lost.is_empty() {
-            out.push_str("# Not identified, with the values of the initial recipe:\n");
+            out.push_str("# Without visible influence on these fields, with the values of the initial recipe:\n");
             lost.iter().for_each(|path| out.push_str(&format!("#   {path}\n")));
         }
         out.push('\n');
@@ -48,8 +61,10 @@ impl Fit {
     fn table(&self, out: &mut String, path: &str, value: &Value, default: &Value) {
         let Some(fields) = value.as_object() else { return };
         let other_kind = fields.get("kind") != default.get("kind");
-        let (tables, plain): (Vec<_>, Vec<_>) =
-            fields.iter().filter(|(name, _)| *name != "version").partition(|(_, v)| is_toml_table(v));
+        let (tables, plain): (Vec<_>, Vec<_>) = fields
+            .iter()
+            .filter(|(name, _)| *name != "version" && *name != "conditions")
+            .partition(|(_, v)| is_toml_table(v));
         let within = |name: &str| if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") };
         let mut lines = String::new();
         for (name, value) in plain.iter().filter(|(name, _)| *name != "kind") {
@@ -80,7 +95,7 @@ impl Fit {
     /// Returns comments about the parameters of a field.
     fn notes(&self, path: &str) -> String {
         let fitted =
-            self.parameters.iter().filter(|a| a.origin != Origin::NotIdentified && a.fields().any(|f| is_at(&f, path)));
+            self.parameters.iter().filter(|a| a.origin != Origin::NotVisible && a.fields().any(|f| is_at(&f, path)));
         fitted.map(|a| format!("# {}\n", a.note())).collect()
     }
 }
@@ -104,11 +119,18 @@ impl ParameterFit {
         let origin = match self.origin {
             Origin::Measured => "measured",
             Origin::Simulated => "simulated",
-            Origin::NotIdentified => "not identified",
+            Origin::NotVisible => "not visible",
         };
         let [value, low, high] = [self.value, self.interval[0], self.interval[1]].map(|v| rounded_to(v, DIGITS));
         let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
-        format!("{origin}: {} {value}{unit} ({low} to {high})", self.what())
+        let what = self.what();
+        let spread = if self.spread > 0.0 {
+            let sd = if self.parameter.prior().scale == Scale::Logarithmic { "log sd" } else { "sd" };
+            format!(", {sd} between fields {}", rounded_to(self.spread, DIGITS))
+        } else {
+            String::new()
+        };
+        format!("{origin}: {what} {value}{unit} ({low} to {high}){spread}")
     }
 }
 
@@ -123,9 +145,9 @@ fn is_at(field: &str, path: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::Distance;
+    use crate::distance::Distance;
     use crate::parameter::{PARAMETERS, Values};
-    use crate::recipe::{FieldSd, Setting, recipe};
+    use crate::recipe::{Setting, matched};
     use papsynth::recipe::Preset;
 
     #[test]
@@ -138,23 +160,24 @@ mod tests {
                 bits: 8,
                 extended: true,
                 seek_pixel: false,
-                field_sd: FieldSd::default(),
             };
             let values = Values::at(&[0.4; PARAMETERS.len()]);
+            let mut other = Values::at(&[0.5; PARAMETERS.len()]);
+            PARAMETERS.into_iter().for_each(|p| other.set_spread(p, 0.05));
             let parameters = PARAMETERS.into_iter().filter(|p| setting.seeks(*p)).map(|parameter| {
-                let origin = if parameter.index() % 3 == 0 { Origin::NotIdentified } else { Origin::Simulated };
+                let origin = if parameter.index() % 3 == 0 { Origin::NotVisible } else { Origin::Simulated };
                 ParameterFit::new(parameter, origin, values.get(parameter))
             });
             let parameters: Vec<ParameterFit> = parameters.collect();
             let fitted =
                 |p| parameters.iter().any(|a: &ParameterFit| a.parameter == p && a.origin == Origin::Simulated);
             let fit = Fit {
-                recipe: recipe(&setting, &values, fitted),
+                recipe: matched(&setting, &values, &[values.clone(), other.clone()], fitted),
                 parameters: parameters.clone(),
-                distance: Distance { before: 3.0, estimated: 2.0, after: 1.5 },
+                distance: Distance { before: 3.0, after: 1.5 },
                 statistics: Vec::new(),
-                fields: 8,
-                windows: 32,
+                refinement: None,
+                fields: vec!["a".into(), "b\nc".into()],
                 nuclei: 200,
                 simulated: 300,
                 extended: true,

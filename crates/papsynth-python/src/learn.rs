@@ -127,7 +127,7 @@ pub(crate) fn judge(
     serde_json::to_string(&report.map_err(wrong)?).map_err(wrong)
 }
 
-fn field_images(
+pub(crate) fn field_images(
     side: &str,
     images: &[ArrayLike<'_>],
     nuclei: Option<&[ArrayLike<'_>]>,

@@ -8,6 +8,7 @@ mod engine;
 mod error;
 mod frame;
 mod learn;
+mod matching;
 mod pool;
 mod sets;
 mod techniques;
@@ -29,6 +30,7 @@ mod _native {
         engine::{Engine, identity, recipe_schema, resolve},
         frame::{Frame, restored},
         learn::{judge, learn},
+        matching::match_fields,
         pool::after_fork,
         sets::{generate, merge, missing, shards, verify},
         techniques::{cloth, cytoskeleton, dyes, fields, fsd, noise, optics, texture},

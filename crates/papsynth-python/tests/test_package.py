@@ -470,6 +470,20 @@ def test_fields_are_judged():
             papsynth.judge(*wrong)
 
 
+def test_a_recipe_is_matched_to_fields():
+    start = {"field": {"width_px": 340, "height_px": 260, "pixel_um": 0.5}}
+    other = {**start, "background": {"level": 0.8, "texture": 0.004}}
+    fields = [papsynth.render({**other, "slide": {"fields_per_slide": 1}}, seed=3, index=index).image for index in range(3)]
+    found = papsynth.match(fields, 0.5, recipe=start, simulations=60, seed=1)
+    level = next(p for p in found["parameters"] if p["parameter"] == "level")
+    assert abs(level["value"] - 0.8) < 0.03 and len(level["fields"]) == len(found["recipe"]["conditions"]) == 3
+    assert found["toml"].startswith("# Matched to 3 fields") and np.isfinite(found["distance"]["after"])
+    assert papsynth.render(found["recipe"], seed=1).image.shape == (260, 340)
+    for wrong in ((fields[:1], 0.5), (fields, -1.0), ([np.full((90, 90), 200, np.uint8)] * 2, 0.5), ([], 0.5)):
+        with pytest.raises((ValueError, TypeError)):
+            papsynth.match(*wrong)
+
+
 def test_targets_are_those_of_detectors():
     cells = {"superficial": {"count": 3}, "intermediate": {"count": 3}}
     frame = papsynth.render({**SMALL, "cells": cells}, seed=7)

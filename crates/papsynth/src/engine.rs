@@ -73,6 +73,18 @@ impl Engine {
         self.assets.timer.time(Stage::Scene, || scene::draw(self.recipe(), &self.model, self.weight_map.as_ref(), key))
     }
 
+    /// As [`scene`](Self::scene), under a given condition of the recipe.
+    ///
+    /// # Errors
+    /// As `scene`.
+    ///
+    /// # Panics
+    /// If there is no such condition.
+    pub fn scene_under(&self, condition: usize, key: Key) -> Result<Scene, Error> {
+        let draw = || scene::draw_under(Some(condition), self.recipe(), &self.model, self.weight_map.as_ref(), key);
+        self.assets.timer.time(Stage::Scene, draw)
+    }
+
     /// Generates an image with ground truth, and passes each plane to `sink` when it is finished. The memory of a plane
     /// is reused.
     ///

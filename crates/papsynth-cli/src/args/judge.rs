@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use papsynth::recipe::Preset;
 use papsynth_judge::NucleiFrom;
 
-use super::values::{integer, named, parse_pixel, preset_parser};
+use super::shared::RecipeArgs;
+use super::values::{integer, named, parse_pixel};
 
 /// Test whether synthetic fields can be distinguished from real ones, and list the distinguishing features.
 ///
@@ -70,36 +70,38 @@ pub(crate) struct Judge {
 
 /// Find the recipe whose fields resemble real ones.
 ///
-/// Light and noise are measured. All other parameters are estimated by simulation: random recipes are rendered,
-/// regressions predict parameters from statistics of fields, and a search minimises the distance to the real fields.
-/// Every value has a 95 % interval. Parameters that the fields do not determine are listed and keep their values.
+/// Light and noise are measured. All other parameters come from simulation: fields with random parameters show how the
+/// statistics of nuclei, cells, debris and background depend on them; then a few rounds of fields around the result
+/// correct it. Each real field has values of its own: the recipe holds them as conditions, one of which is drawn for
+/// each slide. Every value has a 95 % interval; parameters without visible influence are listed and keep their values.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   papsynth match slides --pixel-um 0.33 --out mine.toml
-  papsynth match slides --pixel-um 0.33 --group N --out mine.toml --report mine.json
+  papsynth match slides --pixel-um 0.33 --group N --preset extended-focus --out mine.toml --report mine.json
+  papsynth match slides start.toml --pixel-um 0.33 --out mine.toml --page mine.html
   papsynth match slides --find-pixel --quick --out mine.toml
   papsynth generate mine.toml --out fields --frames 20
 
-REAL is a folder as for `papsynth judge`: images of one size, and masks of nuclei if available.
-Without masks, nuclei are found automatically in real and simulated fields; points are not used,
-because they rarely mark all nuclei. Use 5 to 10 fields; one field does not show the variation
-between fields.
+REAL is a folder as for `papsynth judge`: 2 or more images of one size and one magnification. Nuclei come
+from masks or points if all fields have them, else they are found automatically; always in the same way
+in real and simulated fields. Points must mark all nuclei, else use --nuclei search.
 
-The time grows with the number of simulations: the progress line shows the time left.")]
+Eight fields of 1280 x 960 pixels take about two minutes on two cores; the progress line shows the time
+left. Ctrl-C ends the match, and no file is written.")]
 pub(crate) struct Match {
     /// Folder of real fields
     #[arg(value_name = "REAL")]
     pub(crate) real: PathBuf,
+    /// The initial recipe
+    #[command(flatten)]
+    pub(crate) recipe: RecipeArgs,
     /// Recipe to write; replaces an older recipe of papsynth match, but no other file
     #[arg(long, value_name = "FILE")]
     pub(crate) out: PathBuf,
     /// Replace any existing file
     #[arg(long)]
     pub(crate) force: bool,
-    /// Built-in recipe to begin with; `papsynth init --list` prints all [default: lbc]
-    #[arg(long, value_name = "NAME", value_parser = preset_parser(), default_value = Preset::Lbc.name(), hide_default_value = true, hide_possible_values = true)]
-    pub(crate) preset: Preset,
     /// Pixel size, in micrometres [default: as recorded]
     #[arg(long, value_name = "UM", value_parser = parse_pixel)]
     pub(crate) pixel_um: Option<f64>,
@@ -109,18 +111,29 @@ pub(crate) struct Match {
     /// Use only fields of this group; repeatable
     #[arg(long, value_name = "NAME")]
     pub(crate) group: Vec<String>,
-    /// Number of simulated fields of 640 x 480 pixels, which take most of the time [default: 2000]
+    /// Source of nuclei [default: masks if all fields have them, else points, else search]
+    #[arg(long, value_name = "SOURCE", value_parser = named(NucleiFrom::ALL, NucleiFrom::name))]
+    pub(crate) nuclei: Option<NucleiFrom>,
+    /// Number of simulated fields with random parameters [default: 150]
     #[arg(long, value_name = "N", value_parser = integer(60, 1_000_000_usize), conflicts_with = "quick")]
     pub(crate) simulations: Option<usize>,
-    /// Use a sixth of the simulations and fewer search rounds: wider intervals, fewer parameters
+    /// Simulate fewer fields, for a first impression: wider intervals
     #[arg(long)]
     pub(crate) quick: bool,
+    /// Then search ROUNDS times for parameters with which classifiers distinguish simulated from real fields less
+    /// often; half of the fields are held out
+    #[arg(long, value_name = "ROUNDS", default_value_t = 0, hide_default_value = true, value_parser = integer(0, 10_000_usize))]
+    pub(crate) refine: usize,
     /// Model of `papsynth learn`, or class file (TOML), in addition to the built-in classes
     #[arg(long, value_name = "FILE")]
     pub(crate) model: Option<PathBuf>,
     /// Also write all results to this file, as JSON
     #[arg(long, value_name = "FILE")]
     pub(crate) report: Option<PathBuf>,
+    /// Also compare simulated with real fields as `papsynth judge --quick`, and write its page, which shows parts of
+    /// the images
+    #[arg(long, value_name = "FILE")]
+    pub(crate) page: Option<PathBuf>,
     /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = integer(0, u64::MAX))]
     pub(crate) seed: u64,

@@ -15,7 +15,7 @@ from . import cloth, cytoskeleton, dyes, fields, fsd, noise, optics, texture
 from ._calibrate import calibrate_camera, calibrate_microscope
 from ._dataset import Dataset, IterableDataset
 from ._errors import FieldError, RecipeError
-from ._learn import judge, learn
+from ._learn import judge, learn, match
 from ._native import Engine, Frame
 from ._native import recipe_schema as _recipe_schema
 from ._native import resolve as _resolve
@@ -41,6 +41,7 @@ __all__ = [
     "generate",
     "judge",
     "learn",
+    "match",
     "merge",
     "missing",
     "noise",

@@ -1,4 +1,4 @@
-"""Learning classes from real images, and comparing synthetic with real fields."""
+"""Learning classes from real images, matching recipes to real fields, and comparing synthetic with real fields."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from . import _native
+from ._toml import loads
 
-__all__ = ["judge", "learn"]
+__all__ = ["judge", "learn", "match"]
 
 
 def learn(
@@ -113,19 +114,16 @@ def judge(
     dict
         The content of ``report.json`` of `papsynth judge`.
     """
-    if full_scale is None:
-        kind = np.asarray(real[0]).dtype if len(real) else np.dtype(float)
-        full_scale = float(np.iinfo(kind).max) if np.issubdtype(kind, np.integer) else 1.0
-
+    real = list(real)
     def listed(values):
         return None if values is None else list(values)
 
     return json.loads(
         _native.judge(
-            list(real),
+            real,
             list(synthetic),
             pixel_um,
-            full_scale,
+            _full_scale(real) if full_scale is None else full_scale,
             real_nuclei=listed(real_nuclei),
             synthetic_nuclei=listed(synthetic_nuclei),
             seed=seed,
@@ -133,3 +131,83 @@ def judge(
             threads=threads,
         )
     )
+
+
+def match(
+    real: Sequence[Any],
+    pixel_um: float,
+    *,
+    recipe: Any = None,
+    full_scale: float | None = None,
+    nuclei: Sequence[Any] | None = None,
+    find_pixel: bool = False,
+    simulations: int | None = None,
+    refine: int = 0,
+    quick: bool = False,
+    seed: int = 0,
+    model: Any = None,
+    threads: int = 0,
+) -> dict[str, Any]:
+    """Find the recipe whose fields resemble real ones.
+
+    Parameters
+    ----------
+    real : sequence of array_like
+        Grey fields, each (height, width), of one size and magnification; at least two. Of colour images, give the
+        green channel.
+    pixel_um : float
+        Pixel size, µm.
+    recipe : None, dict, str or os.PathLike
+        Initial recipe: as in `papsynth.render`. What the fields hardly show stays as it is there.
+    full_scale : float, optional
+        Grey level of a saturated pixel. Default: the maximum of the integer type, 1 for floats.
+    nuclei : sequence of array_like, optional
+        Centres of all nuclei of each field, (n, 2): x and y in pixels. By default nuclei are detected.
+    find_pixel : bool
+        Also estimate the pixel size, beginning with `pixel_um`, from the cell size of the initial recipe.
+    simulations : int, optional
+        Number of simulated fields with random parameters. Default: 150.
+    refine : int
+        Rounds of a search for parameters with which classifiers distinguish simulated from real fields less often.
+    quick : bool
+        Simulate fewer fields, for a first impression.
+    seed : int
+        Seed of the random numbers.
+    model : None, dict, str or os.PathLike
+        Model in addition to the built-in one: of `papsynth.learn`, or a class file.
+    threads : int
+        Number of threads; 0 for all processors. The result does not depend on it.
+
+    Returns
+    -------
+    dict
+        ``recipe``: the recipe, for `papsynth.render` and `papsynth.generate`. ``toml``: the same as text, with the
+        estimates as comments. ``parameters``, ``statistics``, ``distance``, …: the content of the report of
+        `papsynth match`.
+
+    Raises
+    ------
+    ValueError
+        If a field cannot be used, or shows too few nuclei; the message names it.
+    """
+    real = list(real)
+    text, plain, report = _native.match_fields(
+        real,
+        pixel_um,
+        _full_scale(real) if full_scale is None else full_scale,
+        recipe=recipe,
+        nuclei=None if nuclei is None else list(nuclei),
+        find_pixel=find_pixel,
+        simulations=simulations,
+        refine=refine,
+        quick=quick,
+        seed=seed,
+        model=model,
+        threads=threads,
+    )
+    return {**json.loads(report), "recipe": loads(plain), "toml": text}
+
+
+def _full_scale(fields: list[Any]) -> float:
+    kind = np.asarray(fields[0]).dtype if fields else np.dtype(float)
+    return float(np.iinfo(kind).max) if np.issubdtype(kind, np.integer) else 1.0

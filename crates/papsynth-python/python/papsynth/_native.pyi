@@ -84,6 +84,21 @@ def generate(
     verify: bool = False,
     progress: Callable[[int], object] | None = None,
 ) -> dict[str, int]: ...
+def match_fields(
+    real: list[Any],
+    pixel_um: float,
+    full_scale: float,
+    *,
+    recipe: Any = None,
+    nuclei: list[Any] | None = None,
+    find_pixel: bool = False,
+    simulations: int | None = None,
+    refine: int = 0,
+    quick: bool = False,
+    seed: int = 0,
+    model: Any = None,
+    threads: int = 0,
+) -> tuple[str, str, str]: ...
 def merge(out: str | PathLike[str], frames: int) -> str: ...
 def shards(
     frames: int, formats: list[str] | None = None, frames_per_shard: int | None = None, without: list[str] | None = None

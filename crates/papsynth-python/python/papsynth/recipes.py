@@ -311,6 +311,14 @@ class CellMix(Section):
     size: Number | None = None
     """Factor by which the size of the cell is multiplied. Drawn for each cell. From 0.1 to 10."""
 
+    nucleus_size: Number | None = None
+    """Factor by which the size of the nucleus is multiplied, in addition to `size`. Drawn for each cell. From 0.1 to 10."""
+
+    size_variation: Number | None = None
+    """Factor by which the standard deviation of the logarithm of the sizes of cells and nuclei is multiplied. Drawn for
+    each cell. From 0 to 5.
+    """
+
     cytoplasm_stain: Number | None = None
     """Factor by which the absorbance of the cytoplasm is multiplied. Drawn for each cell. From 0 to 20."""
 
@@ -1331,6 +1339,16 @@ class Stain(Section):
     field_texture: Number | None = None
     """Factor by which the contrast of the texture of the nuclei of a field is multiplied. Drawn once per field. From 0 to
     20.
+    """
+
+    cytoplasm_variation: Number | None = None
+    """Factor by which the standard deviation of the absorbance of cytoplasm between the cells of a class is multiplied.
+    Drawn once per field. From 0 to 5.
+    """
+
+    nucleus_variation: Number | None = None
+    """Factor by which the standard deviations of absorbance and texture between the nuclei of a class are multiplied.
+    Drawn once per field. From 0 to 5.
     """
 
     slide_balance: Number | None = None

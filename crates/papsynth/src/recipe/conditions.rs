@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::abundance::Abundance;
 use super::number::Number;
-use super::section::{Bounds, Declared, Part, section, within};
+use super::section::{Bounds, Declared, Part, Value, section, within};
 use super::whole::Recipe;
 use crate::error::InvalidField;
 use crate::key::Key;
@@ -66,12 +66,39 @@ impl Recipe {
     /// If there is no such condition.
     #[must_use]
     pub fn with_condition(&self, index: usize) -> Self {
-        let mut recipe = Self { conditions: Vec::new(), ..self.clone() };
+        let mut recipe = self.without_conditions();
         for (path, value) in &self.conditions[index].numbers {
             // Invalid paths are reported by `problems`.
             let _ = recipe.set(path, value);
         }
         recipe
+    }
+
+    /// Returns the recipe without conditions.
+    #[must_use]
+    pub fn without_conditions(&self) -> Self {
+        let mut recipe = Self { version: self.version, ..Self::default() };
+        // There may be thousands of conditions, which need not be copied.
+        recipe.replace(self, |section| section != "conditions");
+        recipe
+    }
+
+    /// Returns the numbers that differ from those of another recipe, as those of a condition of the other recipe. Other
+    /// differences are ignored.
+    #[must_use]
+    pub fn numbers_unlike(&self, other: &Self) -> Numbers {
+        let of_other = other.numbers();
+        let differ = |number: &Declared<'_>| {
+            let same = of_other.iter().find(|o| o.path == number.path);
+            same.is_some_and(|same| same.value != number.value)
+        };
+        let abundance = |value: Value<'_>| match value {
+            Value::Real(number) => Some(Abundance::PerField(number.into_owned())),
+            Value::Density(number) => Some(Abundance::PerMm2(number.clone())),
+            Value::Whole(_) => None,
+        };
+        let changed = self.numbers().into_iter().filter(differ);
+        changed.filter_map(|number| Some((number.path, abundance(number.value)?))).collect()
     }
 
     /// Sets a number that may differ between slides.
@@ -105,9 +132,9 @@ impl Recipe {
         found
     }
 
-    /// Returns the recipe of a slide.
-    pub(crate) fn of_slide(&self, seed: u64, slide: u64) -> Cow<'_, Self> {
-        match self.condition_of_slide(seed, slide) {
+    /// Returns the recipe under one of its conditions, if any.
+    pub(crate) fn under(&self, condition: Option<usize>) -> Cow<'_, Self> {
+        match condition {
             Some(index) => Cow::Owned(self.with_condition(index)),
             None => Cow::Borrowed(self),
         }
@@ -123,10 +150,11 @@ impl Recipe {
     pub(super) fn problems_of_conditions(&self) -> Vec<InvalidField> {
         let mut problems = Vec::new();
         let mut add = |field: String, message: String| problems.push(InvalidField { field, message });
-        let known = Self { conditions: Vec::new(), ..self.clone() }.problems();
+        let plain = self.without_conditions();
+        let known = plain.problems();
         for (index, Condition { numbers, .. }) in self.conditions.iter().enumerate() {
             let at = format!("conditions.{index}");
-            let mut recipe = Self { conditions: Vec::new(), ..self.clone() };
+            let mut recipe = plain.clone();
             for (path, value) in numbers {
                 if let Err(message) = recipe.set(path, value) {
                     add(format!("{at}.numbers.{path}"), message);
@@ -177,6 +205,16 @@ mod tests {
             assert_eq!(Some(condition), recipe.condition_of_slide(5, index / 3));
             assert_eq!(found, scene::draw(&recipe.with_condition(condition), &model, None, key).unwrap());
         }
+    }
+
+    #[test]
+    fn numbers_unlike_those_of_another_recipe_make_a_condition() {
+        let recipe = recipe();
+        let base = recipe.without_conditions();
+        for (index, condition) in recipe.conditions.iter().enumerate() {
+            assert_eq!(recipe.with_condition(index).numbers_unlike(&base), condition.numbers);
+        }
+        assert_eq!(base.numbers_unlike(&base), Numbers::new());
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub(crate) struct Declared<'a> {
 }
 
 /// The value of a declared number.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Value<'a> {
     /// A number or a distribution.
     Real(Cow<'a, Number>),

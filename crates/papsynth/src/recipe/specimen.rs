@@ -158,6 +158,11 @@ section! {
         count: Abundance = Abundance::per_mm2(110), 0..=100000, "per field or per mm²";
         /// Factor by which the size of the cell is multiplied. Drawn for each cell.
         size: Number = 1.0, 0.1..=10;
+        /// Factor by which the size of the nucleus is multiplied, in addition to `size`. Drawn for each cell.
+        nucleus_size: Number = 1.0, 0.1..=10;
+        /// Factor by which the standard deviation of the logarithm of the sizes of cells and nuclei is multiplied.
+        /// Drawn for each cell.
+        size_variation: Number = 1.0, 0..=5;
         /// Factor by which the absorbance of the cytoplasm is multiplied. Drawn for each cell.
         cytoplasm_stain: Number = 1.0, 0..=20;
         /// Factor by which the absorbance of the nucleus is multiplied. Drawn for each cell.
@@ -412,6 +417,12 @@ section! {
         field_nucleus: Number = Number::log_normal(1.0, 0.12), 0..=20;
         /// Factor by which the contrast of the texture of the nuclei of a field is multiplied. Drawn once per field.
         field_texture: Number = Number::log_normal(0.7, 0.28), 0..=20;
+        /// Factor by which the standard deviation of the absorbance of cytoplasm between the cells of a class is
+        /// multiplied. Drawn once per field.
+        cytoplasm_variation: Number = 1.0, 0..=5;
+        /// Factor by which the standard deviations of absorbance and texture between the nuclei of a class are
+        /// multiplied. Drawn once per field.
+        nucleus_variation: Number = 1.0, 0..=5;
         /// Variation of the dye balance between slides: standard deviation of the logarithm of each dye's amount.
         slide_balance: Number = 0.15, 0..=2;
         /// Variation of the dye balance between the fields of a slide, as `slide_balance`.

@@ -195,14 +195,19 @@ fn draw_body(
     let first = random::normal(rng);
     let second = random::normal(rng);
     let correlation = nucleus.size_correlation;
+    let size_variation = mix.size_variation.draw(&mut own("size.variation"));
     let partner = correlation * first + (1.0 - correlation * correlation).max(0.0).sqrt() * second;
-    let radius_um = size * cytoplasm.radius_um.median * libm::exp(cytoplasm.radius_um.log_sd * first);
-    let mut nucleus_um = size * nucleus.radius_um.median * libm::exp(nucleus.radius_um.log_sd * partner);
+    let radius_um = size * cytoplasm.radius_um.median * libm::exp(size_variation * cytoplasm.radius_um.log_sd * first);
+    let nucleus_log_sd = size_variation * nucleus.radius_um.log_sd;
+    let mut nucleus_um = size
+        * mix.nucleus_size.draw(&mut own("nucleus.size"))
+        * nucleus.radius_um.median
+        * libm::exp(nucleus_log_sd * partner);
     /// Largest radius of a nucleus relative to its cell: a larger one extends beyond the cell.
     const WIDEST: f64 = 0.72;
     nucleus_um = nucleus_um.min(WIDEST * radius_um);
     let cytoplasm_absorbance = cytoplasm.absorbance.median
-        * libm::exp(cytoplasm.absorbance.log_sd * random::normal(rng))
+        * libm::exp(stain.cytoplasm_variation * cytoplasm.absorbance.log_sd * random::normal(rng))
         * stain.cytoplasm
         * mix.cytoplasm_stain.draw(rng);
     let detail = draw_detail(recipe, cytoplasm.pliability, rng, &own);
@@ -213,11 +218,13 @@ fn draw_body(
     let angle = random::direction(rng);
     let pyknotic = random::chance(recipe.nucleus.pyknotic.draw(rng), rng);
     let wrinkled = random::chance(recipe.nucleus.wrinkled.draw(rng), rng);
-    let nucleus_absorbance = normal_at_least(nucleus.absorbance.mean, nucleus.absorbance.sd, 0.25, rng)
+    let variation = stain.nucleus_variation;
+    let nucleus_absorbance = normal_at_least(nucleus.absorbance.mean, variation * nucleus.absorbance.sd, 0.25, rng)
         * stain.nucleus
         * mix.nucleus_stain.draw(rng);
     // Darker chromatin varies more: the contrast, sd over mean, is typical of a class.
-    let contrast = normal_at_least(nucleus.chromatin.sd.mean, CONTRAST_SPREAD * nucleus.chromatin.sd.sd, 0.3, rng)
+    let contrast_sd = CONTRAST_SPREAD * variation * nucleus.chromatin.sd.sd;
+    let contrast = normal_at_least(nucleus.chromatin.sd.mean, contrast_sd, 0.3, rng)
         / nucleus.absorbance.mean.max(f64::MIN_POSITIVE);
     let own_number = |(name, number): (&str, &Number)| number.draw(&mut own(name));
     let mut body = NucleusBody {

@@ -29,9 +29,20 @@ pub const MAX_ATTEMPTS: u32 = 8;
 /// # Errors
 /// If no draw can succeed: the weight map is missing or too uneven, or there are more objects than labels can number.
 pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key: Key) -> Result<Scene, Error> {
+    let condition = recipe.condition_of_slide(key.seed, slide_of(recipe, key));
+    draw_under(condition, recipe, model, weight_map, key)
+}
+
+/// As [`draw`], under a given condition of the recipe.
+pub(crate) fn draw_under(
+    condition: Option<usize>,
+    recipe: &Recipe,
+    model: &Model,
+    weight_map: Option<&WeightMap>,
+    key: Key,
+) -> Result<Scene, Error> {
     let slide = slide_of(recipe, key);
-    let condition = recipe.condition_of_slide(key.seed, slide);
-    let recipe = &*recipe.of_slide(key.seed, slide);
+    let recipe = &*recipe.under(condition);
     let field = FieldNumbers { key };
     let view = View {
         width: field.count(named!(recipe.field.width_px)),

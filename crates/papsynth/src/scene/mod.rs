@@ -24,6 +24,7 @@ pub use crate::debris::{
 pub use crate::recipe::camera::SceneCamera;
 pub use crate::recipe::imaging::SceneMicroscope;
 pub use cell::{CellBody, CellDetail, Fold, FoldForm, Halo, NucleusBody, Tint};
+pub(crate) use draw::draw_under;
 pub use draw::{MAX_ATTEMPTS, draw};
 pub use field::{ClassCount, Object, Plot, Scene, SlideFrame};
 pub use imaging::{Fusion, Restoration, SceneBackground, SceneDyes, SceneIllumination, SceneLight, SceneOptics};

@@ -107,7 +107,7 @@ impl Population {
     /// Returns the population of the slide with this key, and the scene of the empty slide.
     pub(crate) fn new(recipe: &Recipe, model: &Model, key: Key) -> Result<(Self, Scene), ErrorKind> {
         let condition = recipe.condition_of_slide(key.seed, key.index);
-        let recipe = &*recipe.of_slide(key.seed, key.index);
+        let recipe = &*recipe.under(condition);
         let slide = FieldNumbers { key };
         let stain = FieldStain::of_slide(&recipe.stain, &slide);
         let pixel_um = pixel_um(recipe, &slide);

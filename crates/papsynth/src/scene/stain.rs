@@ -23,6 +23,10 @@ pub(crate) struct FieldStain<'a> {
     pub(crate) nucleus: f64,
     /// Factor on the contrast of the texture inside nuclei.
     pub(super) texture: f64,
+    /// Factors on the standard deviations between the cells of a class: of the absorbance of cytoplasm, and of the
+    /// absorbance and texture of nuclei.
+    pub(super) cytoplasm_variation: f64,
+    pub(super) nucleus_variation: f64,
     /// Factors on the amounts of dyes.
     balance: Amounts,
 }
@@ -53,6 +57,8 @@ impl<'a> FieldStain<'a> {
                 * field.draw(named!("stain", stain.field_cytoplasm)),
             nucleus: of_slide(named!("stain", stain.slide_nucleus)) * field.draw(named!("stain", stain.field_nucleus)),
             texture: field.draw(named!("stain", stain.field_texture)),
+            cytoplasm_variation: field.draw(named!("stain", stain.cytoplasm_variation)),
+            nucleus_variation: field.draw(named!("stain", stain.nucleus_variation)),
             balance,
         }
     }
