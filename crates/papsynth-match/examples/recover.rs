@@ -1,9 +1,10 @@
-//! Matches recipes to simulated fields with known parameters, and counts how often the intervals contain the true values.
+//! Matches recipes to simulated fields with known parameters, and counts how often the intervals contain the true
+//! values.
 //!
 //! `cargo run --release -p papsynth-match --example recover -- [TRIALS] [FIELDS] [SEED]`
 //!
-//! Each trial draws the mean of each parameter from its range, and the values of fields around it. The truth is the mean
-//! over the fields.
+//! Each trial draws the mean of each parameter from its range, and the values of fields around it. The truth is the
+//! mean over the fields.
 
 #![expect(clippy::print_stdout, reason = "a program prints")]
 

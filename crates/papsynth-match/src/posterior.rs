@@ -1,10 +1,10 @@
 //! The distribution of the parameters of fields, given their statistics.
 //!
-//! The statistics of a field are a quadratic function of its parameters, fitted to simulated samples by ridge regression,
-//! with normal errors. The parameters of fields are normal around their mean, with standard deviations between fields
-//! from an EM algorithm. The mean is that of the largest posterior density, by damped Gauss–Newton steps. Samples that are
-//! simulated around the result correct the function where it matters: indirect inference (Gourieroux, Monfort and
-//! Renault, doi:10.1002/jae.3950080507).
+//! The statistics of a field are a quadratic function of its parameters, fitted to simulated samples by ridge
+//! regression, with normal errors. The parameters of fields are normal around their mean, with standard deviations
+//! between fields from an EM algorithm. The mean is that of the largest posterior density, by damped Gauss–Newton
+//! steps. Samples that are simulated around the result correct the function where it matters: indirect inference
+//! (Gourieroux, Monfort and Renault, doi:10.1002/jae.3950080507).
 
 use nalgebra::{DMatrix, DVector};
 use papsynth_judge::Phase;
@@ -34,8 +34,8 @@ pub(crate) struct Rows {
     pub(crate) rounds: Vec<i32>,
 }
 
-/// Weight of the samples of a round, relative to those of the next one: for slopes and for the mean. Slopes change slowly
-/// over the ranges, so all samples serve; the mean has to be that of samples like the real fields.
+/// Weight of the samples of a round, relative to those of the next one: for slopes and for the mean. Slopes change
+/// slowly over the ranges, so all samples serve; the mean has to be that of samples like the real fields.
 const OLDER: f64 = 0.75;
 const OLDER_MEAN: f64 = 0.65;
 
@@ -49,8 +49,8 @@ impl Rows {
 /// Standard deviation of a uniform distribution over 0 to 1.
 pub(crate) const PRIOR_SD: f64 = 0.288_675_134_594_812_9;
 
-/// Usual standard deviation of the means around the initial recipe. Smaller than that of the range: what the fields hardly
-/// show stays near the initial recipe. The intervals do not use it.
+/// Usual standard deviation of the means around the initial recipe. Smaller than that of the range: what the fields
+/// hardly show stays near the initial recipe. The intervals do not use it.
 pub(crate) const NEAR_SD: f64 = 0.12;
 
 /// Steps of the EM algorithm, and of the search for the mean after each round.
@@ -290,8 +290,8 @@ pub(crate) struct Posterior {
     pub(crate) spreads: Vec<f64>,
     /// Parameters of each field.
     pub(crate) fields: Vec<Vec<f64>>,
-    /// Standard errors of the differences of a field from the mean: with the differences themselves they give the standard
-    /// deviations between fields.
+    /// Standard errors of the differences of a field from the mean: with the differences themselves they give the
+    /// standard deviations between fields.
     pub(crate) difference_errors: Vec<f64>,
 }
 
@@ -314,8 +314,8 @@ impl Posterior {
     }
 }
 
-/// Half the width of a 95 % interval, in standard errors: 1.96, times a factor from trials (`examples/recover.rs`), because
-/// the function of the statistics is itself an estimate.
+/// Half the width of a 95 % interval, in standard errors: 1.96, times a factor from trials (`examples/recover.rs`),
+/// because the function of the statistics is itself an estimate.
 const HALF_WIDTH: f64 = 1.5 * 1.96;
 
 /// The mean over fields has no information about a parameter if its standard error is larger than this fraction of that
