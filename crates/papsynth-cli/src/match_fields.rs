@@ -1,7 +1,5 @@
 //! `papsynth match`: the recipe whose fields resemble real fields.
 
-use std::path::PathBuf;
-
 use papsynth::{Engine, Inputs};
 use papsynth_dataset::read::FieldFile;
 use papsynth_judge::{Control, FieldImage, NucleiAnnotation, NucleiFrom, Progress, describe};
@@ -34,12 +32,8 @@ const MAX_PRINTED: usize = 8;
 
 pub(crate) fn run(args: &args::Match) -> Result<(), ExitError> {
     let recipe_file = OutputFile::check(&args.out, RECIPE, args.force)?;
-    let optional = |path: &'_ Option<PathBuf>, kind: Kind| -> Result<Option<PathBuf>, ExitError> {
-        path.as_deref().map(|path| OutputFile::check(path, kind, args.force)).transpose()?;
-        Ok(path.clone())
-    };
-    let report_file = optional(&args.report, REPORT)?;
-    let page_file = optional(&args.page, PAGE)?;
+    let report_file = args.report.as_deref().map(|path| OutputFile::check(path, REPORT, args.force)).transpose()?;
+    let page_file = args.page.as_deref().map(|path| OutputFile::check(path, PAGE, args.force)).transpose()?;
     for (option, path) in [("--report", &args.report), ("--page", &args.page)] {
         let Some(path) = path else { continue };
         if *path == args.out || (option == "--page" && args.report.as_ref() == Some(path)) {
@@ -78,13 +72,13 @@ pub(crate) fn run(args: &args::Match) -> Result<(), ExitError> {
     bar.clear();
     let (fit, page) = result.map_err(|error| exit_error(&error, &args.real))?;
 
-    if let Some(path) = report_file {
+    if let Some(file) = report_file {
         let text = serde_json::to_string_pretty(&json!({ "match_report": 1, "fit": fit, "seed": args.seed }));
-        OutputFile::check(&path, REPORT, args.force)?.write(format!("{}\n", text.unwrap_or_default()).as_bytes())?;
+        file.write(format!("{}\n", text.unwrap_or_default()).as_bytes())?;
     }
     let mut text = summary(&fit);
-    if let (Some(path), Some(page)) = (page_file, page) {
-        OutputFile::check(&path, PAGE, args.force)?.write(page.to_html().as_bytes())?;
+    if let (Some(file), Some(path), Some(page)) = (page_file, &args.page, page) {
+        file.write(page.to_html().as_bytes())?;
         text.push_str(&format!("\n{}{}\n", page.to_text(), path.display()));
     }
     recipe_file.write(fit.to_toml().as_bytes())?;
