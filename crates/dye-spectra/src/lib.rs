@@ -14,4 +14,4 @@ pub use curve::Curve;
 pub use dye::{Amounts, DYES, Dye, absorbance, amounts};
 pub use light::{Lamp, Sensor};
 pub use params::{ColourParams, Error, Mixing};
-pub use srgb::encode_srgb;
+pub use srgb::{encode_srgb, tone_curve};

@@ -7,13 +7,18 @@ use crate::rows::{Wavelength, exact};
 
 type Matrix = [[f64; 3]; 3];
 
+/// Returns the sRGB value of a linear value, both 0 to 1 (IEC 61966-2-1). Values outside of the range are clamped.
+#[must_use]
+pub fn tone_curve(linear: f64) -> f64 {
+    let linear = linear.clamp(0.0, 1.0);
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * libm::pow(linear, 1.0 / 2.4) - 0.055 }
+}
+
 /// Encodes a linear sRGB value, 0 to 1, as 8 bits (IEC 61966-2-1). Values outside of the range are clamped.
 #[must_use]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 255 after clamping")]
 pub fn encode_srgb(linear: f64) -> u8 {
-    let linear = linear.clamp(0.0, 1.0);
-    let encoded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * libm::pow(linear, 1.0 / 2.4) - 0.055 };
-    (255.0 * encoded + 0.5) as u8
+    (255.0 * tone_curve(linear) + 0.5) as u8
 }
 
 /// Colour matching functions of the CIE 1931 standard observer by Wyman, Sloan and Shirley, *Simple Analytic

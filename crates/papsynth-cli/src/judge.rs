@@ -192,10 +192,12 @@ fn exit_error(error: &Error, file: Option<&FieldFile>) -> ExitError {
 /// Reads a field with its nuclei.
 pub(crate) fn field_image(file: &FieldFile) -> Result<FieldImage, ExitError> {
     let image = file.read(&Limits::default())?;
+    let levels = |plane: &[u16]| plane.iter().map(|g| f32::from(*g)).collect();
     Ok(FieldImage {
         name: file.name.clone(),
         group: file.group.clone(),
-        grey: image.grey.iter().map(|g| f32::from(*g)).collect(),
+        grey: levels(&image.grey),
+        red_blue: image.red_blue.as_ref().map(|planes| planes.each_ref().map(|plane| levels(plane))),
         width: image.width,
         full_scale: f32::from(image.white),
         nuclei: match image.nuclei {

@@ -24,6 +24,8 @@ pub struct FieldImage {
     pub group: String,
     /// Grey levels, row by row, top row first, 0 to [`full_scale`](Self::full_scale).
     pub grey: Vec<f32>,
+    /// Red and blue of a colour image, as `grey`, which is its green channel. Not compared; [`None`] for grey images.
+    pub red_blue: Option<[Vec<f32>; 2]>,
     /// Columns.
     pub width: usize,
     /// The grey level of a saturated pixel: 255 for 8 bits, 65535 for 16, 1 for fractions.
@@ -39,6 +41,7 @@ impl Default for FieldImage {
             name: String::new(),
             group: String::new(),
             grey: Vec::new(),
+            red_blue: None,
             width: 0,
             full_scale: 255.0,
             nuclei: NucleiAnnotation::None,
@@ -77,6 +80,9 @@ impl FieldImage {
         }
         if let Some(bad) = self.grey.iter().find(|v| !(v.is_finite() && **v >= 0.0 && **v <= self.full_scale)) {
             return refuse(format!("has the grey level {bad}; expected 0 to the full scale, {}", self.full_scale));
+        }
+        if self.red_blue.iter().flatten().any(|plane| plane.len() != self.grey.len()) {
+            return refuse("has a red or blue channel of another size than its green one".to_owned());
         }
         if self.grey.iter().all(|v| *v == self.grey[0]) {
             return refuse("is constant; expected an image with contrast".to_owned());
@@ -127,6 +133,8 @@ impl FieldImage {
             name: self.name.clone(),
             group: self.group.clone(),
             grey: part(&self.grey, self.width, [left, top], [width, height]),
+            red_blue: (self.red_blue.as_ref())
+                .map(|planes| planes.each_ref().map(|plane| part(plane, self.width, [left, top], [width, height]))),
             width,
             full_scale: self.full_scale,
             nuclei: match &self.nuclei {
@@ -172,7 +180,7 @@ impl FieldImage {
                 )
             }
         };
-        Self { grey, width: wide, nuclei, ..self.clone() }
+        Self { grey, red_blue: None, width: wide, nuclei, ..self.clone() }
     }
 }
 

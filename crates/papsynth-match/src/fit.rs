@@ -1,6 +1,6 @@
 //! The complete match: measurement, simulation, regression, rounds around the result.
 
-use papsynth::recipe::{self, Recipe};
+use papsynth::recipe::{self, Colour, LightSection, Recipe};
 use papsynth_judge::{Control, Detail, FieldImage, Phase, Report};
 use portable_numerics::random::normal;
 use rand_core::SeedableRng;
@@ -11,6 +11,7 @@ use serde::Serialize;
 use crate::compare::{LEAST_FIELDS as LEAST_REFINED, Refine, Refinement, report};
 use crate::distance::{Distance, Statistic, statistics};
 use crate::error::Error;
+use crate::hues::correct;
 use crate::measured::{Measured, measure_in};
 use crate::parameter::{Level, PARAMETERS, Parameter, Prior, Source, Values};
 use crate::posterior::{Knowledge, NEAR_SD, PRIOR_SD, Posterior, Response, Rows};
@@ -139,6 +140,8 @@ pub struct Fit {
     pub simulated: usize,
     /// Whether the real fields are fused from several focal planes (extended depth of field).
     pub extended: bool,
+    /// Whether the real fields are colour images.
+    pub colour: bool,
 }
 
 /// A match of a recipe to real fields.
@@ -164,6 +167,10 @@ const NARROW: f64 = 0.4;
 
 /// Fields to simulate for the final comparison, of each recipe.
 const COMPARED: usize = 16;
+
+/// Fields to simulate for each correction of the hues of stains, and the corrections before and after the search.
+const HUED: usize = 8;
+const CORRECTIONS: [usize; 2] = [2, 1];
 
 /// Number of pixel sizes that are tried.
 const PIXELS: f64 = 12.0;
@@ -191,11 +198,15 @@ impl Match {
     }
 
     /// Returns the setting for real fields, and the known parameter values.
-    fn setting(&self, measured: &Measured) -> (Setting, Values) {
+    fn setting(&self, measured: &Measured, colour: bool) -> (Setting, Values) {
         // Fused images differ from others by more than their noise.
         let fused = measured.extended && self.base.focus.output == recipe::FocusOutput::Planes;
+        let mut base = if fused { self.base.clone().fused() } else { self.base.clone() };
+        if colour && matches!(base.light, LightSection::Monochrome(_)) {
+            base.light = LightSection::Colour(Colour::default());
+        }
         let setting = Setting {
-            base: if fused { self.base.clone().fused() } else { self.base.clone() },
+            base,
             size_px: measured.size_px,
             pixel_um: self.params.pixel.um(),
             bits: measured.bits,
@@ -233,11 +244,15 @@ impl Match {
             });
         }
         let per_round = ROUND.max(fields.len().min(2 * ROUND));
-        let count = self.params.simulations + self.params.rounds * per_round + 2 * COMPARED;
+        let colour = fields.iter().all(|field| field.red_blue.is_some());
+        let corrected = if colour { CORRECTIONS.map(|rounds| rounds * HUED) } else { [0; 2] };
+        let count =
+            self.params.simulations + self.params.rounds * per_round + 2 * COMPARED + corrected.iter().sum::<usize>();
         let total = 2 * fields.len() + count;
         let phase = control.resume("measuring fields", 0, total);
         let measured = measure_in(fields, self.params.pixel.um(), &phase)?;
-        let sampler = Sampler::new(measured.size_px, self.params.pixel.um(), measured.nuclei_from, Detail::Statistics)?;
+        let sampler = Sampler::new(measured.size_px, self.params.pixel.um(), measured.nuclei_from, Detail::Statistics)?
+            .with_colour(colour);
         let (real, samples) = of_fields(fields, &sampler, &phase)?;
         check_magnification(fields, &real)?;
         let nuclei = real.iter().map(|field| field.nuclei).sum();
@@ -245,12 +260,32 @@ impl Match {
             let pixel_um = self.params.pixel.um();
             return Err(Error::Nuclei { found: nuclei, fields: fields.len(), least: LEAST_NUCLEI, pixel_um });
         }
-        let (setting, known) = self.setting(&measured);
+        let (mut setting, known) = self.setting(&measured, colour);
+        let initial = self.initial(&setting);
+        let hues = Summary::mean(&real).hues();
+        let mut done = 2 * fields.len();
+        // Corrects the dyes for the hues of fields of a recipe.
+        let correct_dyes = |recipe: &Recipe, base: &mut Recipe, done: &mut usize| -> Result<(), Error> {
+            let phase = control.resume(SIMULATING, *done, total);
+            // Real fields have mean hues as well.
+            let mut recipe = recipe.clone();
+            (recipe.stain.slide_balance, recipe.stain.field_balance) = (0.0.into(), 0.0.into());
+            let measure = |image: &FieldImage| Summary::of(image, &sampler, control);
+            let made = samples_of(&recipe, &sampler, make, [*done, HUED], &phase, self.params.seed, measure)?;
+            if let (Some(real), Some(simulated)) = (&hues, &Summary::mean(&made).hues()) {
+                correct(base, real, simulated);
+            }
+            *done = phase.done();
+            Ok(())
+        };
+        for _ in 0..corrected[0] / HUED {
+            let measured = recipe(&setting, &known, |parameter| parameter.prior().source == Source::Measured);
+            correct_dyes(&measured, &mut setting.base, &mut done)?;
+        }
         let simulator = Simulator { setting: &setting, sampler: &sampler, make, seed: self.params.seed };
         let sought = simulated(&setting);
         let mut search = Search { measured: &measured, real: &real, samples, known, sought, rows: Rows::default() };
 
-        let mut done = 2 * fields.len();
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(self.params.seed ^ 0x726f_756e_6473);
         let place = |p: &Parameter| p.prior().place(search.known.get(*p)).clamp(0.0, 1.0);
         let prior: Vec<f64> = search.sought.iter().map(place).collect();
@@ -281,13 +316,17 @@ impl Match {
             (posterior, refinement) = (found, Some(result));
         }
 
+        for _ in 0..corrected[1] / HUED {
+            let (_, found) = search.results(&setting, &posterior);
+            correct_dyes(&found, &mut setting.base, &mut done)?;
+        }
         let (parameters, recipe) = search.results(&setting, &posterior);
         let phase = control.resume(SIMULATING, done, total);
         let samples = |of: &Recipe, first: usize| {
             let measure = |image: &FieldImage| Summary::of(image, &sampler, control);
             samples_of(of, &sampler, make, [first, COMPARED], &phase, self.params.seed, measure)
         };
-        let before = samples(&self.initial(&setting), done)?;
+        let before = samples(&initial, done)?;
         let after = samples(&recipe, done + COMPARED)?;
         let (distance, statistics) = statistics(&real, &before, &after);
         Ok(Fit {
@@ -300,6 +339,7 @@ impl Match {
             nuclei,
             simulated: count,
             extended: measured.extended,
+            colour,
         })
     }
 

@@ -5,6 +5,7 @@ mod compare;
 mod distance;
 mod error;
 mod fit;
+mod hues;
 mod measured;
 mod noise;
 mod parameter;

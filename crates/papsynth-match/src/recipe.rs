@@ -282,16 +282,19 @@ fn camera(r: &mut Recipe, log_sd: f64, on: &impl Fn(P) -> bool, or_base: &impl F
     }
     /// Minimum fraction of photon noise and of read noise.
     const LEAST: f64 = 0.02;
+    /// Range of the full well in recipes, electrons.
+    const WELL: [f64; 2] = [10.0, 1e7];
     let glare = centre(&r.camera.glare_subtracted);
     let signal = signal(or_base(P::Level), glare);
     let all = or_base(P::Noise) * or_base(P::Noise);
     let pattern = or_base(P::Pattern).clamp(0.0, P::Pattern.prior().high) * all;
     let rest = (all - pattern - ROUNDING).max(0.1 * all);
     let photons = or_base(P::Photons).clamp(LEAST, 1.0 - LEAST);
-    let per_dn = signal / (photons * rest);
+    let per_well = LEVELS / (1.0 - glare);
+    let per_dn = (signal / (photons * rest)).clamp(WELL[0] / per_well, WELL[1] / per_well);
     let read = per_dn * ((1.0 - photons) * rest).sqrt();
     let camera = &mut r.camera;
-    camera.full_well_e = number(per_dn * LEVELS / (1.0 - glare));
+    camera.full_well_e = number(per_dn * per_well);
     // Only the read noise varies between fields.
     let spread = (log_sd / (1.0 - photons)).min(0.5);
     camera.read_noise_e = if spread > 0.02 { log_normal(read, spread) } else { number(read) };
@@ -397,7 +400,7 @@ fn about(middle: f64, like: &Number) -> Number {
 }
 
 /// Multiplies a distribution by a factor.
-fn times(number: &Number, factor: f64) -> Number {
+pub(crate) fn times(number: &Number, factor: f64) -> Number {
     let by = |value: &f64| rounded(value * factor);
     match number {
         Number::Fixed(value) => Number::Fixed(by(value)),
@@ -459,6 +462,10 @@ mod tests {
                 let problems = recipe(&setting, &values, |_| true).problems();
                 assert!(problems.is_empty(), "{preset:?} at {place}: {problems:?}");
             }
+            let mut faint = Values::at(&[0.5; PARAMETERS.len()]);
+            [P::Noise, P::Photons].into_iter().for_each(|parameter| faint.set(parameter, parameter.prior().low));
+            let problems = recipe(&setting, &faint, |_| true).problems();
+            assert!(problems.is_empty(), "{preset:?} with faint noise: {problems:?}");
             for parameter in PARAMETERS {
                 let values = Values::at(&[0.9; PARAMETERS.len()]);
                 let problems = recipe(&setting, &values, |p| p == parameter).problems();

@@ -22,6 +22,8 @@ pub struct Sampler {
     pub size_px: [usize; 2],
     pub(crate) pixel_um: f64,
     from: NucleiFrom,
+    /// Whether hues are measured.
+    pub(crate) colour: bool,
     pub(crate) measurer: Measurer,
 }
 
@@ -34,7 +36,13 @@ impl Sampler {
         let measurer =
             Measurer::new(&MeasurerParams { pixel_um, nuclei_from: from, detail, ..MeasurerParams::default() })?;
         let size_px = [0, 1].map(|i| field_px[i].min(SAMPLE_PX[i]));
-        Ok(Self { size_px, pixel_um, from, measurer })
+        Ok(Self { size_px, pixel_um, from, colour: false, measurer })
+    }
+
+    /// Also measures the hues of stains, or does not: all images are colour images.
+    #[must_use]
+    pub fn with_colour(self, colour: bool) -> Self {
+        Self { colour, ..self }
     }
 
     /// Cuts a field into as many samples as fit, centred and without gaps.
@@ -89,12 +97,17 @@ impl Sampler {
         };
         /// Colour images: green, which the stains of nuclei and cytoplasm absorb most.
         const GREEN: usize = 1;
-        let channel = if channels == 3 { GREEN } else { 0 };
+        const RED: usize = 0;
+        const BLUE: usize = 2;
+        let plane =
+            |channel: usize| grey.iter().skip(channel).step_by(channels).map(|g| f32::from(*g)).collect::<Vec<f32>>();
+        let is_colour = channels == 3;
         let truth = &finished.truth;
         Ok(FieldImage {
             name: format!("{}", key.index),
             group: String::new(),
-            grey: grey.iter().skip(channel).step_by(channels).map(|g| f32::from(*g)).collect(),
+            grey: plane(if is_colour { GREEN } else { 0 }),
+            red_blue: is_colour.then(|| [RED, BLUE].map(plane)),
             width: truth.width,
             full_scale: single(libm::exp2(bits) - 1.0),
             nuclei: self.annotation(&finished),

@@ -4,6 +4,7 @@ use papsynth_judge::number::{single, whole};
 use papsynth_judge::{Control, FeatureTable, Field, FieldImage, Statistics};
 
 use crate::error::Error;
+use crate::hues::{HUES, Hues, hues};
 use crate::noise;
 use crate::sampler::Sampler;
 use portable_numerics::statistics::{mean, quantile};
@@ -172,6 +173,11 @@ impl Summary {
             all.put(format!("pairs of nuclei within {um} um"), libm::log((found + 1.0) / (expected + 1.0)));
         }
         all.put_objects("cells", cells, &CELLS);
+        if sampler.colour {
+            HUES.into_iter()
+                .zip(hues(image, &nuclei.places, sampler.pixel_um))
+                .for_each(|(name, hue)| all.put(name, hue));
+        }
         Ok(all)
     }
 
@@ -182,6 +188,11 @@ impl Summary {
         let names = parts.first().map_or(Vec::new(), |part| part.names.clone());
         let values = (0..names.len()).map(one).collect();
         Self { names, values, nuclei: parts.iter().map(|part| part.nuclei).sum() }
+    }
+
+    /// Returns the hues, the last statistics of a colour image.
+    pub(crate) fn hues(&self) -> Option<Hues> {
+        self.values.last_chunk().copied()
     }
 
     fn put(&mut self, name: impl Into<String>, value: f64) {

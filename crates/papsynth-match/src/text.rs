@@ -47,6 +47,11 @@ impl Fit {
                 "# The fields are fused from several focal planes (EDF): the initial recipe is that of a fusing scanner.\n",
             );
         }
+        if self.colour {
+            out.push_str(
+                "# The dyes of nuclei and cytoplasm and the tints of cells have the mean colours of the fields.\n",
+            );
+        }
         let lost: Vec<&str> =
             self.parameters.iter().filter(|a| a.origin == Origin::NotVisible).map(|a| a.path).collect();
         if !lost.is_empty() {
@@ -181,6 +186,7 @@ mod tests {
                 nuclei: 200,
                 simulated: 300,
                 extended: true,
+                colour: true,
             };
             let text = fit.to_toml();
             let read: Recipe = toml::from_str(&text).unwrap_or_else(|e| panic!("{preset:?}: {e}\n{text}"));

@@ -47,6 +47,23 @@ pub(crate) fn pixels(name: &str, image: &ArrayLike<'_>) -> PyResult<(Vec<f32>, u
     Ok((values, width))
 }
 
+/// Grey levels; red and blue of a colour image, of which the grey levels are the green channel; and the width.
+pub(crate) type Channels = (Vec<f32>, Option<[Vec<f32>; 2]>, usize);
+
+/// Returns the pixels of a grey image, or of a colour image of shape (height, width, 3).
+pub(crate) fn channels(name: &str, image: &ArrayLike<'_>) -> PyResult<Channels> {
+    let py = image.py();
+    let shape: Vec<usize> = py.import("numpy")?.call_method1("shape", (image,))?.extract().unwrap_or_default();
+    if shape.len() != 3 || shape[2] != 3 {
+        let (grey, width) = pixels(name, image)?;
+        return Ok((grey, None, width));
+    }
+    let array = py.import("numpy")?.call_method1("asarray", (image,))?;
+    let channel = |c: usize| pixels(name, &array.get_item((py.Ellipsis(), c))?);
+    let ((red, _), (green, width), (blue, _)) = (channel(0)?, channel(1)?, channel(2)?);
+    Ok((green, Some([red, blue]), width))
+}
+
 /// Returns the pixels of an image with values in a range, and its width.
 pub(crate) fn pixels_within(name: &str, image: &ArrayLike<'_>, [low, high]: [f32; 2]) -> PyResult<(Vec<f32>, usize)> {
     let (values, width) = pixels(name, image)?;

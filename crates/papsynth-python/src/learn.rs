@@ -5,7 +5,7 @@ use papsynth_judge::{Field, FieldImage, Judge, JudgeParams, Measurer, MeasurerPa
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use crate::array::{ArrayLike, nth, pixels, pixels_within, points};
+use crate::array::{ArrayLike, channels, nth, pixels, pixels_within, points};
 use crate::engine::read_model;
 use crate::error::wrong;
 use crate::pool;
@@ -140,12 +140,20 @@ pub(crate) fn field_images(
         return Err(wrong(format!("{side}_nuclei: expected one entry per field, {}", images.len())));
     }
     let one = |(number, image): (usize, &ArrayLike<'_>)| {
-        let (grey, width) = pixels(&nth(side, number), image)?;
+        let (grey, red_blue, width) = channels(&nth(side, number), image)?;
         let nuclei = match nuclei {
             None => NucleiAnnotation::None,
             Some(nuclei) => NucleiAnnotation::Points(points(&nth(&format!("{side}_nuclei"), number), &nuclei[number])?),
         };
-        Ok(FieldImage { name: format!("{side}[{number}]"), group: String::new(), grey, width, full_scale, nuclei })
+        Ok(FieldImage {
+            name: format!("{side}[{number}]"),
+            group: String::new(),
+            grey,
+            red_blue,
+            width,
+            full_scale,
+            nuclei,
+        })
     };
     images.iter().enumerate().map(one).collect()
 }

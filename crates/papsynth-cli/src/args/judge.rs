@@ -85,7 +85,8 @@ Examples:
 
 REAL is a folder as for `papsynth judge`: 2 or more images of one size and one magnification. Nuclei come
 from masks or points if all fields have them, else they are found automatically; always in the same way
-in real and simulated fields. Points must mark all nuclei, else use --nuclei search.
+in real and simulated fields. Points must mark all nuclei, else use --nuclei search. If all fields are
+colour images, the dyes of nuclei and cytoplasm are matched as well, and the recipe is one of colour images.
 
 Eight fields of 1280 x 960 pixels take about two minutes on two cores; the progress line shows the time
 left. Ctrl-C ends the match, and no file is written.")]

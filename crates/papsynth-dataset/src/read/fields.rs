@@ -23,7 +23,9 @@ const TABLE_BYTES: u64 = 1 << 26;
 const DEEP: [u32; 3] = [12, 14, 16];
 
 /// The channel that is read of three: stains of nuclei and cytoplasm absorb green most.
+const RED: usize = 0;
 const GREEN: usize = 1;
+const BLUE: usize = 2;
 
 /// Annotated nuclei of a field.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,6 +70,8 @@ pub struct FieldImage {
     pub width: usize,
     /// Grey levels in row-major order; of colour images, the green channel.
     pub grey: Vec<u16>,
+    /// Red and blue of a colour image.
+    pub red_blue: Option<[Vec<u16>; 2]>,
     /// The grey level of a saturated pixel.
     pub white: u16,
     /// Annotated nuclei.
@@ -101,8 +105,11 @@ impl FieldFile {
     pub fn read(&self, limits: &Limits) -> Result<FieldImage, Error> {
         let image = LevelImage::read(&self.image, limits)?;
         let channel = if image.channels == 3 { GREEN } else { 0 };
-        let grey: Vec<u16> = image.levels.iter().skip(channel).step_by(image.channels).copied().collect();
-        let brightest = grey.iter().copied().max().unwrap_or(0);
+        let plane = |channel: usize| image.levels.iter().skip(channel).step_by(image.channels).copied().collect();
+        let grey: Vec<u16> = plane(channel);
+        let red_blue = (image.channels == 3).then(|| [RED, BLUE].map(plane));
+        let planes = red_blue.iter().flatten().chain([&grey]);
+        let brightest = planes.flatten().copied().max().unwrap_or(0);
         let deep = || DEEP.map(white).into_iter().find(|w| *w >= brightest).unwrap_or(u16::MAX);
         let full = self.white.unwrap_or_else(|| if image.white == u16::MAX { deep() } else { image.white });
         let nuclei = match &self.nuclei {
@@ -118,7 +125,7 @@ impl FieldFile {
                 FieldNuclei::Labels(separate(labels, limits).map_err(Error::input(path))?)
             }
         };
-        Ok(FieldImage { width: image.width, grey, white: full.max(brightest), nuclei })
+        Ok(FieldImage { width: image.width, grey, red_blue, white: full.max(brightest), nuclei })
     }
 }
 

@@ -29,7 +29,7 @@ fn image(kind: u8, width: usize, height: usize, seed: u64, known: u8) -> FieldIm
         _ => NucleiAnnotation::Masks((0..pixels).map(|i| u32::try_from((i / 37) % 5).unwrap()).collect()),
     };
     let grey = (0..pixels).map(|i| grey(kind, i, width, seed)).collect();
-    FieldImage { name: "any".to_owned(), group: String::new(), grey, width, full_scale: 255.0, nuclei }
+    FieldImage { name: "any".to_owned(), grey, width, nuclei, ..FieldImage::default() }
 }
 
 proptest! {

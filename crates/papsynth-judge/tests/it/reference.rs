@@ -36,6 +36,7 @@ fn pictures(folder: &Path) -> Vec<FieldImage> {
             grey: image.into_raw().into_iter().map(f32::from).collect(),
             full_scale: 255.0,
             nuclei: NucleiAnnotation::Points(points.lines().map(point).collect()),
+            ..FieldImage::default()
         }
     };
     rows.par_iter().map(picture).collect()

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{Preset, Recipe};
+use papsynth::recipe::{Colour, LightSection, Preset, Recipe};
 use papsynth::{Engine, Inputs};
 use papsynth_judge::{Control, Detail, FieldImage, NucleiAnnotation, NucleiFrom, Progress};
 use papsynth_match::{
@@ -20,13 +20,20 @@ fn engine(recipe: &Recipe) -> Result<Engine, papsynth::Error> {
 }
 
 fn setting(size_px: [usize; 2]) -> Setting {
-    Setting { base: Preset::Lbc.recipe(), size_px, pixel_um: PIXEL_UM, bits: 8, extended: true, seek_pixel: false }
+    setting_of(Preset::Lbc.recipe(), size_px)
+}
+
+fn setting_of(base: Recipe, size_px: [usize; 2]) -> Setting {
+    Setting { base, size_px, pixel_um: PIXEL_UM, bits: 8, extended: true, seek_pixel: false }
 }
 
 /// Simulates fields of a recipe that differs from the preset, by `apart` in the logarithm of blur between fields.
 fn fields(count: u64, from: NucleiFrom, apart: f64) -> Vec<FieldImage> {
-    let sampler = Sampler::new(FIELD, PIXEL_UM, from, Detail::Statistics).unwrap();
-    let setting = setting(FIELD);
+    fields_of(&setting(FIELD), count, from, apart)
+}
+
+fn fields_of(setting: &Setting, count: u64, from: NucleiFrom, apart: f64) -> Vec<FieldImage> {
+    let sampler = Sampler::new(setting.size_px, PIXEL_UM, from, Detail::Statistics).unwrap();
     let field = |index: u64| {
         let mut values = setting.base_values();
         let off = index as f64 - 0.5 * (count - 1) as f64;
@@ -39,7 +46,7 @@ fn fields(count: u64, from: NucleiFrom, apart: f64) -> Vec<FieldImage> {
         ] {
             values.set(parameter, value);
         }
-        let engine = engine(&recipe(&setting, &values, |_| true)).unwrap();
+        let engine = engine(&recipe(setting, &values, |_| true)).unwrap();
         sampler.simulate(&engine, None, Key { seed: 11, index }, &Control::NONE).unwrap()
     };
     (0..count).map(field).collect()
@@ -135,6 +142,7 @@ fn invalid_fields_and_parameters_are_errors_and_the_stop_flag_ends_a_match() {
         width,
         full_scale: 255.0,
         nuclei: NucleiAnnotation::None,
+        ..FieldImage::default()
     };
     let run = |fields: &[FieldImage]| {
         small(PixelSize::Known(PIXEL_UM), 0).run(fields, &engine, &Control::NONE).unwrap_err().to_string()
@@ -179,4 +187,26 @@ fn invalid_fields_and_parameters_are_errors_and_the_stop_flag_ends_a_match() {
     };
     let control = Control { stop: &stop, report: &after_three };
     assert_eq!(small(PixelSize::Known(PIXEL_UM), 0).run(&fields, &engine, &control), Err(Error::Stopped));
+}
+
+#[test]
+fn the_stains_of_colour_fields_are_matched() {
+    let mut base = Preset::Lbc.recipe();
+    base.light = LightSection::Colour(Colour::default());
+    (base.stain.nucleus.eosin_y, base.stain.cyanophilic.eosin_y) = (0.6, 1.0);
+    let images = fields_of(&setting_of(base, [420, 320]), 4, NucleiFrom::Masks, 0.0);
+    let fit = on_threads(2, &images, &small(PixelSize::Known(PIXEL_UM), 0));
+    assert!(fit.colour && matches!(fit.recipe.light, LightSection::Colour(_)));
+    let text = fit.to_toml();
+    assert!(text.contains("mean colours of the fields"), "{text}");
+    for kind in ["nuclei", "blue-green cytoplasm"] {
+        let name = format!("red over green absorbance of {kind}");
+        let found = fit.statistics.iter().find(|s| s.name == name).unwrap();
+        let [before, after] = [found.before, found.after].map(|value| (value - found.real).abs());
+        assert!(after < 0.6 * before, "{name}: {found:?}");
+    }
+    let mut grey = images;
+    grey[2].red_blue = None;
+    let fit = on_threads(2, &grey, &small(PixelSize::Known(PIXEL_UM), 0));
+    assert!(!fit.colour && matches!(fit.recipe.light, LightSection::Monochrome(_)));
 }

@@ -95,7 +95,8 @@ def judge(
     Parameters
     ----------
     real, synthetic : sequence of array_like
-        Grey fields, each (height, width), of the same pixel size; at least two of each.
+        Fields of the same pixel size, each (height, width), or (height, width, 3) in colour; at least two of each.
+        Of colour images the green channel is compared.
     pixel_um : float
         Pixel size, µm.
     full_scale : float, optional
@@ -153,8 +154,7 @@ def match(
     Parameters
     ----------
     real : sequence of array_like
-        Grey fields, each (height, width), of one size and magnification; at least two. Of colour images, give the
-        green channel.
+        Fields of one size and magnification, each (height, width), or (height, width, 3) in colour; at least two.
     pixel_um : float
         Pixel size, µm.
     recipe : None, dict, str or os.PathLike
