@@ -297,8 +297,9 @@ section! {
         flecks_threshold: Number = Number::uniform(0.55, 0.85), 0..=0.999;
         /// Amplitude of the third level of detail, the cytoskeleton, relative to the absorbance of the cytoplasm.
         cytoskeleton: Number = Number::uniform(0.05, 0.18), 0..=2;
-        /// Amplitude of the fine grain of the cytoplasm, relative to its absorbance.
-        grain: Number = Number::uniform(0.06, 0.18), 0..=2;
+        /// Amplitude of the fine grain of the cytoplasm, relative to its absorbance: standard deviation over areas of
+        /// 0.25 µm.
+        grain: Number = Number::uniform(0.2, 0.6), 0..=2;
         /// Probability that a cell is granular.
         granular: Number (undrawn) = 0.2, 0..=1;
         /// Number of granules of a granular cell per 100 µm².

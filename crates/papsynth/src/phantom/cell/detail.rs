@@ -7,7 +7,7 @@ use crate::error::ErrorKind;
 use crate::key::Stream;
 use crate::phantom::box_sums::{add_row, for_each_row_of_sums};
 use crate::phantom::cell_context::CellContext;
-use crate::phantom::noise_fields::{FieldSampler, NoiseField, SIDE, Texels};
+use crate::phantom::noise_fields::{FieldSampler, NoiseField, SIDE, Texels, grain_of_pixel};
 use crate::phantom::parametric_shape::perturbed_circle;
 use crate::phantom::tile::{Point, Tile, scaled_about};
 use crate::random;
@@ -24,7 +24,8 @@ pub(super) fn add_detail(absorbance: &mut Tile, coverage: &Tile, cell: &CellCont
     let clouds = FieldSampler::clouds(detail.clouds_um / pixel_um, rng);
     let flecks = FieldSampler::fine(pixel_um, rng);
     let grain = FieldSampler::fine(pixel_um, rng);
-    let (cloud, fleck, grainy) = (detail.clouds as f32, detail.flecks as f32, detail.grain as f32);
+    let grainy = (detail.grain * grain_of_pixel(pixel_um)) as f32;
+    let (cloud, fleck) = (detail.clouds as f32, detail.flecks as f32);
     let threshold = if fleck > 0.0 { noise_fields.flecks().quantile(detail.flecks_threshold) } else { 0.0 };
     let width = absorbance.width;
     let slow = cloud > 0.0 && detail.clouds_um / pixel_um >= SMOOTH_PX;
