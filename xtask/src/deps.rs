@@ -39,7 +39,7 @@ const RULES: [(&[&str], &[&[&str]]); 15] = [
     // Shows files and a study; the engine defines the groups of objects.
     (&["papsynth-web"], &[ENGINE, &["papsynth-dataset", "papsynth-study"]]),
     // Simulates with the engine and measures with the judge.
-    (&["papsynth-match"], &[NUMERICS, ENGINE, &["papsynth-judge"]]),
+    (&["papsynth-match"], &[NUMERICS, ENGINE, &["papsynth-judge", "dye-spectra"]]),
     // Translates errors of the techniques to options of `papsynth calibrate`.
     (&["papsynth-cli"], &[TECHNIQUES, ENGINE, FRONT, &["papsynth-match", "papsynth-study", "papsynth-web"]]),
     // The same for Python.
