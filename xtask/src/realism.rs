@@ -16,6 +16,9 @@ const PIXEL_UM: &str = "0.33";
 /// Number of fields generated for each comparison.
 const FRAMES: &str = "16";
 
+/// Sets of features of the judge: the first one stays the same, so that its results can be compared with older ones.
+const FEATURES: [&str; 2] = ["1", "2"];
+
 /// Packages of the random forest.
 const FOREST: &str = "numpy\npillow\npycocotools\nscikit-learn\nscipy\n";
 
@@ -52,13 +55,15 @@ pub(crate) fn run(workspace: &Workspace, quick: bool) -> Result<()> {
                 let words = ["--frames", FRAMES, "--set", "slide.fields_per_slide=1"].map(PathBuf::from);
                 dataset::generate(program(workspace), &fields, recipe.into_iter().chain(words))?;
                 for (judged, against) in [(half, "fitted half"), (1 - half, "other half")] {
-                    let report = folder.join(format!("report-{what}-{grade}-{half}-{judged}"));
-                    let mut judge = program(workspace);
-                    judge.arg("judge").arg(&halves[judged]).arg(&fields).arg("--out").arg(&report);
-                    judge.args(["--pixel-um", PIXEL_UM, "--group", grade]);
-                    shell::run(&mut judge)?;
-                    table +=
-                        &judgements(&report, &format!("{name}, {against}"), &format!("{what}, half {}", half + 1))?;
+                    for features in FEATURES {
+                        let report = folder.join(format!("report-{what}-{grade}-{half}-{judged}-{features}"));
+                        let mut judge = program(workspace);
+                        judge.arg("judge").arg(&halves[judged]).arg(&fields).arg("--out").arg(&report);
+                        judge.args(["--pixel-um", PIXEL_UM, "--group", grade, "--features", features]);
+                        shell::run(&mut judge)?;
+                        let recipe = format!("{what}, half {}, features {features}", half + 1);
+                        table += &judgements(&report, &format!("{name}, {against}"), &recipe)?;
+                    }
                 }
             }
         }
@@ -134,7 +139,7 @@ fn judgements(report: &Path, fields: &str, recipe: &str) -> Result<String> {
             "{fields} | {recipe} | {name} | {within} of {of} Q-Q slopes and shifts within the band, slopes {least:.2} to {most:.2} |\n"
         );
     }
-    let scalars = list(&report["beside"]["scalars"]);
+    let scalars = list(&report["field_comparison"]["scalars"]);
     let outside: Vec<&str> =
         scalars.iter().filter(|s| s["within"] == false).filter_map(|s| s["name"].as_str()).collect();
     let (within, of) = (scalars.len() - outside.len(), scalars.len());

@@ -51,7 +51,8 @@ pub(crate) fn run(args: &args::Judge) -> Result<(), ExitError> {
     let params = MeasurerParams { pixel_um, nuclei_from, ..MeasurerParams::default() };
     let measurer = Measurer::new(&params).map_err(ExitError::input)?;
     let params = if args.quick { JudgeParams::quick() } else { JudgeParams::default() };
-    let judge = Judge::new(&JudgeParams { seed: args.seed, ..params }).map_err(ExitError::input)?;
+    let judge =
+        Judge::new(&JudgeParams { seed: args.seed, features: args.features, ..params }).map_err(ExitError::input)?;
     let stop = exit::stop_flag()?;
     let bar = Bar::start(args.quiet);
     let report = |progress: Progress| bar.update(progress.done as u64, progress.total as u64, progress.phase);

@@ -17,7 +17,7 @@ pub fn describe(name: &str) -> String {
 }
 
 /// Descriptions of names without a number.
-const FIXED: [(&str, &str); 81] = [
+const FIXED: [(&str, &str); 89] = [
     // Nuclei.
     ("nucleus area, um2", "nuclear area, µm²"),
     ("nucleus eccentricity", "elongation of the nucleus (0 for a circle)"),
@@ -64,6 +64,15 @@ const FIXED: [(&str, &str); 81] = [
     ("unevenness between sectors", "variation of absorbance with direction in the cell"),
     ("darkest sector over median", "absorbance of the darkest sector over that of the cell"),
     ("steep part of the rim", "steep fraction of the cell border"),
+    // Windows inside cells.
+    ("cytoplasm skewness at 1 px", "asymmetry of the texture of cytoplasm at 1 px"),
+    ("cytoplasm skewness at 2 px", "asymmetry of the texture of cytoplasm at 2 px"),
+    ("cytoplasm skewness at 4 px", "asymmetry of the texture of cytoplasm at 4 px"),
+    ("cytoplasm kurtosis at 1 px", "sparseness of the texture of cytoplasm at 1 px (kurtosis)"),
+    ("cytoplasm kurtosis at 2 px", "sparseness of the texture of cytoplasm at 2 px (kurtosis)"),
+    ("cytoplasm kurtosis at 4 px", "sparseness of the texture of cytoplasm at 4 px (kurtosis)"),
+    ("cytoplasm correlation of 1 with 2 px", "coincidence of details of 1 and 2 px in cytoplasm"),
+    ("cytoplasm correlation of 2 with 4 px", "coincidence of details of 2 and 4 px in cytoplasm"),
     // Patches.
     ("log slope across over down", "horizontal over vertical gradient, log10"),
     ("log noise, dn", "noise of the flattest areas, grey levels of 255, log10"),
@@ -130,6 +139,9 @@ fn numbered(name: &str) -> Option<String> {
     }
     if let Some(px) = of("cytoplasm power at ", " px over median") {
         return Some(format!("contrast of the cytoplasm at {}", cycles(px)?));
+    }
+    if let Some(range) = of("cytoplasm power at ", " cycles/px") {
+        return Some(format!("power inside cells at {} cycles/px, ln", range.replace('-', "–")));
     }
     if let Some(q) = of("cytoplasm quantile ", " over median") {
         return Some(format!("absorbance of the cytoplasm over its median, {}", percentile(q)?));

@@ -13,12 +13,48 @@ use crate::measure::{
 };
 use crate::moments::{self, Moments};
 use crate::statistics::{of_sorted, quantile, sorted};
-use crate::table::FeatureTable;
+use crate::table::{FeatureKind, FeatureTable};
 use crate::two_sample::{TwoSample, TwoSampleParams, two_sample};
+
+/// Features that the classifiers use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+pub enum FeatureSet {
+    /// The features of version 0.1, so that results stay comparable.
+    #[serde(rename = "1")]
+    First,
+    /// Also the texture of cytoplasm in windows inside cells.
+    #[default]
+    #[serde(rename = "2")]
+    Second,
+}
+
+impl FeatureSet {
+    /// All sets, the oldest first.
+    pub const ALL: [Self; 2] = [Self::First, Self::Second];
+
+    /// Returns the name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::First => "1",
+            Self::Second => "2",
+        }
+    }
+
+    /// Returns the columns of a table that the set has.
+    fn of(self, table: &FeatureTable) -> FeatureTable {
+        match self {
+            Self::First => table.without(FeatureKind::Cytoplasm),
+            Self::Second => table.clone(),
+        }
+    }
+}
 
 /// Parameters of a comparison.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct JudgeParams {
+    /// Features that the classifiers use. Default: the second set.
+    pub features: FeatureSet,
     /// The classifier two-sample test.
     pub two_sample: TwoSampleParams,
     /// Nuclei of each side in the smaller Q-Q plots, 8 to 100000. Default 30, as in the paper.
@@ -40,7 +76,8 @@ impl JudgeParams {
 
 impl Default for JudgeParams {
     fn default() -> Self {
-        Self { two_sample: TwoSampleParams::default(), paper_nuclei: 30, draws: 400, seed: 0 }
+        let (features, two_sample) = (FeatureSet::default(), TwoSampleParams::default());
+        Self { features, two_sample, paper_nuclei: 30, draws: 400, seed: 0 }
     }
 }
 
@@ -197,7 +234,8 @@ impl Judge {
         let mut tests = Vec::new();
         let mut test = |name: String, of: fn(&Field) -> &FeatureTable, group: Option<&str>| -> Result<(), Error> {
             let tables = |fields: &[Field]| -> Vec<FeatureTable> {
-                fields.iter().filter(|f| group.is_none_or(|g| f.group == g)).map(|f| of(f).clone()).collect()
+                let chosen = fields.iter().filter(|f| group.is_none_or(|g| f.group == g));
+                chosen.map(|f| self.params.features.of(of(f))).collect()
             };
             let (params, seed, phase) = (&self.params.two_sample, self.params.seed, format!("classifying {name}"));
             match two_sample(&tables(real), &tables(synthetic), params, seed, &phase, control)? {

@@ -27,7 +27,9 @@ pub use control::{Control, Phase, Progress};
 pub use describe::describe;
 pub use error::Error;
 pub use image::{FieldImage, NucleiAnnotation};
-pub use judge::{Conclusion, Curve, FieldComparison, Judge, JudgeParams, Percentiles, Report, Scalar, Test};
+pub use judge::{
+    Conclusion, Curve, FeatureSet, FieldComparison, Judge, JudgeParams, Percentiles, Report, Scalar, Test,
+};
 pub use measure::{
     Detail, Field, HISTOGRAM, HISTOGRAM_FROM, HISTOGRAM_STEP, Measurer, MeasurerParams, Named, NucleiFrom, PROFILE,
     RADII_UM, Statistics, clark_evans, frequencies, ripley,

@@ -19,6 +19,8 @@ pub enum FeatureKind {
     Surroundings,
     /// Texture inside.
     Texture,
+    /// Texture of cytoplasm in windows inside cells.
+    Cytoplasm,
     /// Width and strength of edges.
     Edges,
     /// Power at several scales.
@@ -37,6 +39,7 @@ impl FeatureKind {
             Self::Border => "border",
             Self::Surroundings => "surroundings",
             Self::Texture => "texture",
+            Self::Cytoplasm => "cytoplasm",
             Self::Edges => "edges",
             Self::Spectrum => "spectrum",
             Self::Noise => "noise",
@@ -82,6 +85,18 @@ impl FeatureTable {
     pub fn row(&self, row: usize) -> &[f32] {
         let width = self.features.len();
         &self.values[row * width..(row + 1) * width]
+    }
+
+    /// Returns the table without the features of a kind.
+    #[must_use]
+    pub(crate) fn without(&self, kind: FeatureKind) -> Self {
+        let kept: Vec<usize> = (0..self.features.len()).filter(|c| self.features[*c].kind != kind).collect();
+        let values = (0..self.len()).flat_map(|row| kept.iter().map(move |c| self.row(row)[*c]));
+        Self {
+            features: kept.iter().map(|c| self.features[*c].clone()).collect(),
+            values: values.collect(),
+            places: self.places.clone(),
+        }
     }
 
     /// Returns the known values of a feature, row by row.

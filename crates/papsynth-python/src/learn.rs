@@ -1,7 +1,9 @@
 //! Learning of classes, and comparison of synthetic with real fields.
 
 use papsynth::learn::{Donors, LearnParams, Material, NucleusImage};
-use papsynth_judge::{Field, FieldImage, Judge, JudgeParams, Measurer, MeasurerParams, NucleiAnnotation, NucleiFrom};
+use papsynth_judge::{
+    FeatureSet, Field, FieldImage, Judge, JudgeParams, Measurer, MeasurerParams, NucleiAnnotation, NucleiFrom,
+};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
@@ -83,7 +85,7 @@ fn outlines(name: &str, outlines: Option<Vec<ArrayLike<'_>>>) -> PyResult<Vec<Ve
 
 /// Returns the report of `papsynth.judge` as JSON.
 #[pyfunction]
-#[pyo3(signature = (real, synthetic, pixel_um, full_scale, *, real_nuclei=None, synthetic_nuclei=None, seed=0, quick=false, threads=0))]
+#[pyo3(signature = (real, synthetic, pixel_um, full_scale, *, real_nuclei=None, synthetic_nuclei=None, seed=0, quick=false, features="2", threads=0))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
 pub(crate) fn judge(
     py: Python<'_>,
@@ -95,6 +97,7 @@ pub(crate) fn judge(
     synthetic_nuclei: Option<Vec<ArrayLike<'_>>>,
     seed: u64,
     quick: bool,
+    features: &str,
     threads: usize,
 ) -> PyResult<String> {
     let nuclei_from = match (&real_nuclei, &synthetic_nuclei) {
@@ -109,7 +112,9 @@ pub(crate) fn judge(
     let measurer =
         Measurer::new(&MeasurerParams { pixel_um, nuclei_from, ..MeasurerParams::default() }).map_err(wrong)?;
     let params = if quick { JudgeParams::quick() } else { JudgeParams::default() };
-    let judge = Judge::new(&JudgeParams { seed, ..params }).map_err(wrong)?;
+    let features = FeatureSet::ALL.into_iter().find(|set| set.name() == features);
+    let features = features.ok_or_else(|| wrong("features: expected '1' or '2'"))?;
+    let judge = Judge::new(&JudgeParams { seed, features, ..params }).map_err(wrong)?;
     let pool = pool::of(py, threads)?;
     let report = py.detach(|| {
         pool.install(|| {

@@ -464,6 +464,9 @@ def test_fields_are_judged():
     recipe = {"field": {"width_px": 640, "height_px": 480}}
     one, other = ([papsynth.render(recipe, seed=seed, index=index).image for index in range(6)] for seed in (1, 2))
     report = papsynth.judge(one, other, 0.25, quick=True)
+    assert papsynth.judge(one, other, 0.25, quick=True, features="1")["judge"]["features"] == "1"
+    with pytest.raises(ValueError, match="features: expected '1' or '2'"):
+        papsynth.judge(one, other, 0.25, features="3")
     assert report["conclusion"] and report == papsynth.judge(one, other, 0.25, quick=True, threads=1)
     for wrong in ((one[:1], other, 0.25), (one, other, -1.0), (one, [np.zeros(3)] * 3, 0.25), ([], other, 0.25)):
         with pytest.raises((ValueError, TypeError)):

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use papsynth_judge::NucleiFrom;
+use papsynth_judge::{FeatureSet, NucleiFrom};
 
 use super::shared::RecipeArgs;
 use super::values::{integer, named, parse_pixel};
@@ -54,6 +54,9 @@ pub(crate) struct Judge {
     /// Source of nuclei [default: masks if all fields have them, else points, else search]
     #[arg(long, value_name = "SOURCE", value_parser = named(NucleiFrom::ALL, NucleiFrom::name))]
     pub(crate) nuclei: Option<NucleiFrom>,
+    /// Set of features: 1, of version 0.1, for comparison with older reports; 2, also the texture of cytoplasm
+    #[arg(long, value_name = "SET", default_value = "2", value_parser = named(FeatureSet::ALL, FeatureSet::name))]
+    pub(crate) features: FeatureSet,
     /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = integer(0, u64::MAX))]
     pub(crate) seed: u64,

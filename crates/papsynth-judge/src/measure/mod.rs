@@ -1,6 +1,7 @@
 //! Measurements of field images.
 
 mod cell;
+mod cytoplasm;
 mod maps;
 mod noise;
 mod nucleus;
@@ -181,11 +182,12 @@ impl Measurer {
             Ok((cell.features(&maps, pixel_um), cell.shape.centre))
         });
         let of_cells = of_cells.collect::<Result<_, Error>>()?;
+        let windows = cytoplasm::windows(&maps, &ids);
         let (patches, thumbnail) = match self.params.detail {
             Detail::Statistics => (FeatureTable::default(), Vec::new()),
             Detail::Everything => {
                 let in_8_bits = maps.grey.iter().map(|g| u8::try_from(nearest(f64::from(*g))).unwrap_or(u8::MAX));
-                (patch::patches(&maps, control)?, in_8_bits.collect())
+                (patch::patches(&maps, &windows, control)?, in_8_bits.collect())
             }
         };
         Ok(Field {
@@ -193,7 +195,7 @@ impl Measurer {
             group: image.group.clone(),
             width: maps.width,
             height: maps.height,
-            statistics: Statistics::new(&maps, &ids, &regions, &cells, pixel_um),
+            statistics: Statistics::new(&maps, &ids, &regions, &cells, &windows, pixel_um),
             nuclei: of_nuclei,
             cells: of_cells,
             patches,

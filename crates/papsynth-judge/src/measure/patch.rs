@@ -2,6 +2,7 @@
 
 use multiversion::multiversion;
 
+use super::cytoplasm::{self, medians};
 use super::maps::{BANDS, Maps, width_at};
 use super::noise::{Noise, blocks};
 use crate::control::Control;
@@ -56,7 +57,7 @@ struct Fine<'a> {
 }
 
 /// Measures all patches of a field.
-pub(crate) fn patches(maps: &Maps, control: &Control) -> Result<FeatureTable, Error> {
+pub(crate) fn patches(maps: &Maps, windows: &[cytoplasm::Window], control: &Control) -> Result<FeatureTable, Error> {
     control.check()?;
     let fine = Fine {
         maps,
@@ -71,7 +72,12 @@ pub(crate) fn patches(maps: &Maps, control: &Control) -> Result<FeatureTable, Er
     let patch = |[left, top]: [usize; 2]| {
         let window = Window { left, top, wide, high };
         control.check()?;
-        Ok((features(&fine, window), [(left + wide / 2) as f64, (top + high / 2) as f64]))
+        let mut row = features(&fine, window);
+        let inside = medians(windows.iter().filter(|w| window.contains(w.centre)));
+        for (name, value) in cytoplasm::NAMES.into_iter().zip(inside) {
+            row.put(FeatureKind::Cytoplasm, name, value);
+        }
+        Ok((row, [(left + wide / 2) as f64, (top + high / 2) as f64]))
     };
     places.map(patch).collect()
 }
@@ -85,6 +91,10 @@ struct Window {
 }
 
 impl Window {
+    fn contains(self, [x, y]: [usize; 2]) -> bool {
+        (self.left..self.left + self.wide).contains(&x) && (self.top..self.top + self.high).contains(&y)
+    }
+
     /// Returns the values of the window in an image that is downsampled by `2^shift`.
     fn of<T: Copy>(self, image: &[T], width: usize, shift: usize) -> impl Iterator<Item = T> {
         let rows = (self.top >> shift)..((self.top + self.high) >> shift).max((self.top >> shift) + 1);
@@ -185,10 +195,7 @@ fn edges(row: &mut Row, fine: &Fine, window: Window) {
     let sum = |image: &[f32]| window.of(image, maps.width, 0).map(|v| f64::from(v.abs())).sum::<f64>();
     let [across, down] = fine.gradient.each_ref().map(|image| sum(image).max(1e-9));
     row.put(FeatureKind::Edges, "log slope across over down", libm::log10(across / down));
-    let within = |p: usize| {
-        let (x, y) = (p % maps.width, p / maps.width);
-        (window.left..window.left + window.wide).contains(&x) && (window.top..window.top + window.high).contains(&y)
-    };
+    let within = |p: usize| window.contains([p % maps.width, p / maps.width]);
     let widths = sorted(maps.edges.iter().filter(|e| within(e.pixel)).map(|e| e.sigma));
     for q in [0.1, 0.5, 0.9] {
         row.put(FeatureKind::Edges, format!("edge sigma, px, quantile {q}"), width_at(&widths, q));
@@ -294,7 +301,7 @@ mod tests {
     use super::*;
 
     fn measured(maps: &Maps) -> FeatureTable {
-        patches(maps, &Control::NONE).unwrap()
+        patches(maps, &[], &Control::NONE).unwrap()
     }
 
     #[test]

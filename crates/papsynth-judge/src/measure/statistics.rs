@@ -8,6 +8,7 @@ use rustfft::{Fft, FftPlannerScalar};
 use serde::{Deserialize, Serialize};
 
 use super::cell::{COVERED, Cell, PROFILE};
+use super::cytoplasm::{NAMES, TEXTURE, Window, medians};
 use super::maps::{Maps, width_at};
 use super::noise::{BLOCK, Noise, blocks};
 use crate::number::{nearest, single, whole};
@@ -70,7 +71,7 @@ macro_rules! statistics {
 }
 
 statistics! {
-    (maps: &Maps, ids: &[u32], nuclei: &[Region], cells: &[Cell], pixel_um: f64) {
+    (maps: &Maps, ids: &[u32], nuclei: &[Region], cells: &[Cell], windows: &[Window], pixel_um: f64) {
         let pixels = maps.absorbance.len() as f64;
         let noise = empty_noise(maps);
         let noise_of = |f: &dyn Fn(&Noise) -> f64| noise.as_ref().map_or(f64::NAN, f);
@@ -143,6 +144,10 @@ statistics! {
     /// Median over free cells of the absorbance in ten rings from border to centre, over the median of the cell.
     #[serde(deserialize_with = "numbers")]
     profile: [f64; PROFILE] = std::array::from_fn(|i| middle_of(profiles.iter().map(|p| p[i])));
+    /// Texture of cytoplasm in windows of 64 x 64 pixels inside cells, medians: natural logarithm of the power in eight
+    /// frequency bands, skewness, kurtosis and correlation of band-pass responses.
+    #[serde(deserialize_with = "numbers")]
+    cytoplasm: [f64; TEXTURE] = medians(windows.iter()), names NAMES;
     /// Fractions of the field in bins of absorbance, from [`HISTOGRAM_FROM`] in steps of [`HISTOGRAM_STEP`].
     histogram: Vec<f64> = histogram(&maps.absorbance);
     /// Logarithm to base 10 of the power of absorbance in rings of [`frequencies`].

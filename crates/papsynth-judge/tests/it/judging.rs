@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use papsynth_judge::{
-    Conclusion, Control, Error, FeatureKind, Field, FieldImage, Judge, JudgeParams, Measurer, MeasurerParams,
-    NucleiAnnotation, NucleiFrom, Progress, Report, TwoSampleParams,
+    Conclusion, Control, Error, FeatureKind, FeatureSet, Field, FieldImage, Judge, JudgeParams, Measurer,
+    MeasurerParams, NucleiAnnotation, NucleiFrom, Progress, Report, TwoSampleParams,
 };
 
 use crate::support::Toy;
@@ -255,6 +255,20 @@ fn a_comparison_reports_its_phases_and_stops() {
     let end = |p: Progress| stop.store(p.phase == "classifying patches", Ordering::Relaxed);
     let control = Control { stop: &stop, report: &end };
     assert_eq!(judge().compare_with(&real, &synthetic, &control).unwrap_err(), Error::Stopped);
+}
+
+#[test]
+fn the_first_set_of_features_has_no_texture_of_cytoplasm() {
+    let (real, synthetic) = (fields(Toy::default(), 1), fields(Toy::default(), 2));
+    let kinds = |features: FeatureSet| {
+        let judge = Judge::new(&JudgeParams { features, ..JudgeParams::quick() }).unwrap();
+        let report = judge.compare(&real, &synthetic).unwrap();
+        let kinds = test(&report, "patches").result.kinds.clone();
+        kinds.iter().any(|kind| kind.kind == FeatureKind::Cytoplasm)
+    };
+    assert!(!kinds(FeatureSet::First));
+    let measured = real[0].patches.features.iter().any(|f| f.kind == FeatureKind::Cytoplasm);
+    assert!(measured);
 }
 
 #[test]

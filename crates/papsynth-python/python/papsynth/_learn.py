@@ -88,6 +88,7 @@ def judge(
     synthetic_nuclei: Sequence[Any] | None = None,
     seed: int = 0,
     quick: bool = False,
+    features: str = "2",
     threads: int = 0,
 ) -> dict[str, Any]:
     """Compare synthetic with real fields.
@@ -107,6 +108,8 @@ def judge(
         Seed of the classifier.
     quick : bool
         Five times as fast, with fewer trees and repetitions.
+    features : {'1', '2'}
+        Set of features: '1', of version 0.1, for comparison with older reports; '2', also the texture of cytoplasm.
     threads : int
         Number of threads; 0 for all processors. The result does not depend on it.
 
@@ -129,6 +132,7 @@ def judge(
             synthetic_nuclei=listed(synthetic_nuclei),
             seed=seed,
             quick=quick,
+            features=features,
             threads=threads,
         )
     )

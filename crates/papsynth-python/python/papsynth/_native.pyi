@@ -130,6 +130,7 @@ def judge(
     synthetic_nuclei: list[Any] | None = None,
     seed: int = 0,
     quick: bool = False,
+    features: str = "2",
     threads: int = 0,
 ) -> str: ...
 def learn(
