@@ -37,16 +37,19 @@ def features(grey):
     return np.stack(columns, axis=-1).reshape(image.size, -1)
 
 
-def synthetic(folder, index):
-    """Return a field of a data set and the mask of its nuclei."""
-    grey = np.asarray(Image.open(folder / "images" / f"{index:06}.png").convert("L"), dtype=np.float32)
-    coco = json.loads((folder / "frames" / f"{index:06}.coco.json").read_text())
+def synthetic(folder):
+    """Return the fields of a data set, each with the mask of its nuclei."""
+    coco = json.loads((folder / "coco.json").read_text())
     names = {category["id"]: category["name"] for category in coco["categories"]}
-    nuclei = np.zeros(grey.shape, bool)
+    fields = {}
+    for image in sorted(coco["images"], key=lambda image: image["id"]):
+        grey = np.asarray(Image.open(folder / image["file_name"]).convert("L"), dtype=np.float32)
+        fields[image["id"]] = (grey, np.zeros(grey.shape, bool))
     for annotation in coco["annotations"]:
         if "nucleus" in names[annotation["category_id"]]:
+            nuclei = fields[annotation["image_id"]][1]
             nuclei |= rle.decode(annotation["segmentation"]).astype(bool)
-    return grey, nuclei
+    return list(fields.values())
 
 
 def dice(found, true):
@@ -62,11 +65,10 @@ def main():
     parser.add_argument("--fields", type=int, default=20)
     arguments = parser.parse_args()
     random = np.random.default_rng(SEED)
-    count = len(list((arguments.synthetic / "images").glob("*.png")))
-    seen = min(arguments.fields, count - 2)
+    fields = synthetic(arguments.synthetic)
+    seen = min(arguments.fields, len(fields) - 2)
     rows, sides = [], []
-    for index in range(seen):
-        grey, nuclei = synthetic(arguments.synthetic, index)
+    for grey, nuclei in fields[:seen]:
         table, mask = features(grey), nuclei.ravel()
         for side in (True, False):
             places = np.flatnonzero(mask == side)
@@ -78,11 +80,10 @@ def main():
     probability = lambda grey: forest.predict_proba(features(grey))[:, 1].reshape(grey.shape)
     thresholds = np.linspace(0.3, 0.98, 35)
     scores = np.zeros(thresholds.size)
-    for index in range(seen, count):
-        grey, nuclei = synthetic(arguments.synthetic, index)
+    for grey, nuclei in fields[seen:]:
         likely = probability(grey)
         scores += [dice(likely >= threshold, nuclei) for threshold in thresholds]
-    scores /= count - seen
+    scores /= len(fields) - seen
     threshold = thresholds[np.argmax(scores)]
     grey = np.asarray(Image.open(arguments.image).convert("L"), dtype=np.float32)
     true = np.asarray(Image.open(arguments.mask).convert("L")) > 0

@@ -69,6 +69,7 @@ pub(crate) fn run(workspace: &Workspace, quick: bool) -> Result<()> {
         }
     }
     for (what, recipe) in [("default", None), ("matched", Some(matched("N", 0)))] {
+        shell::write(&folder.join("table.md"), &table)?;
         table += &match python::environment(workspace, "forest", FOREST) {
             Ok(python) => forest(workspace, &python, &reference, &folder, what, recipe)?,
             Err(reason) if reason.is::<Skipped>() => {

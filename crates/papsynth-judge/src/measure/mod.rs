@@ -1,5 +1,6 @@
 //! Measurements of field images.
 
+mod bare_cytoplasm;
 mod cell;
 mod cytoplasm;
 mod maps;
@@ -20,6 +21,7 @@ use crate::region::Region;
 use crate::table::FeatureTable;
 use maps::Maps;
 
+pub use bare_cytoplasm::BareCytoplasm;
 pub use cell::PROFILE;
 pub(crate) use patch::PATCH_PX;
 pub use statistics::{
@@ -203,6 +205,21 @@ impl Measurer {
             fingerprint: fingerprint(&image),
             params: self.params.clone(),
         })
+    }
+
+    /// Returns the areas of an image that show the texture of cytoplasm alone.
+    ///
+    /// # Errors
+    /// As [`measure`](Self::measure).
+    pub fn bare_cytoplasm(&self, image: &FieldImage) -> Result<BareCytoplasm, Error> {
+        image.check()?;
+        let image = image.trimmed();
+        image.check()?;
+        let maps = Maps::new(&image);
+        let regions = self.nuclei(&maps, &image.nuclei);
+        let ids = ids(&maps, &regions);
+        let noise_dn = statistics::empty_noise(&maps).map_or(f64::NAN, |noise| noise.variance.sqrt());
+        Ok(BareCytoplasm::new(maps, &ids, noise_dn, self.params.pixel_um))
     }
 
     /// Measures several images in parallel. `read` returns the image of an item, so that not all images are in memory

@@ -220,7 +220,7 @@ fn histogram(absorbance: &[f32]) -> Vec<f64> {
 }
 
 /// Returns the noise of the empty slide, or of the flattest 1/30 of the field if there is no empty slide.
-fn empty_noise(maps: &Maps) -> Option<Noise> {
+pub(super) fn empty_noise(maps: &Maps) -> Option<Noise> {
     const LEAST: usize = 8;
     const FLATTEST: f64 = 1.0 / 30.0;
     let places: Vec<[usize; 2]> = blocks([0, 0], [maps.width, maps.height]).collect();
