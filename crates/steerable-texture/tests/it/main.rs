@@ -1,0 +1,6 @@
+//! Tests of the public interface.
+
+mod pyramid;
+mod statistics;
+mod synthesis;
+mod textures;
