@@ -9,8 +9,10 @@ use papsynth::recipe::{
     Rendition,
 };
 use papsynth::truth::Group;
-use papsynth::{Engine, Error, Frame, Inputs};
+use papsynth::{Engine, Frame, Inputs};
+use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use sha2::{Digest, Sha256};
+use steerable_texture::{PyramidParams, Statistics, SynthesisParams, Synthesizer, TextureParams};
 
 /// Seed of all recipes.
 const SEED: u64 = 20_150_624;
@@ -20,7 +22,7 @@ const SEED: u64 = 20_150_624;
 ///
 /// # Errors
 /// If a recipe is invalid.
-pub fn lines() -> Result<String, Error> {
+pub fn lines() -> Result<String, Box<dyn core::error::Error>> {
     let mut lines = String::new();
     for (name, recipe) in recipes() {
         let engine = Engine::new(&recipe, &Model::builtin(), &Inputs::default())?;
@@ -29,7 +31,24 @@ pub fn lines() -> Result<String, Error> {
             lines.push_str(&format!("{name} {stage} {hash}\n"));
         }
     }
+    for (stage, hash) in texture()? {
+        lines.push_str(&format!("texture {stage} {hash}\n"));
+    }
     Ok(lines)
+}
+
+/// Returns hashes of the statistics of a small texture and of an image synthesized from them.
+fn texture() -> Result<[(&'static str, String); 2], steerable_texture::Error> {
+    const SIDE: usize = 64;
+    let pyramid = PyramidParams { scales: 3, orientations: 4 };
+    let params = SynthesisParams { texture: TextureParams { pyramid, neighbourhood: 7 }, iterations: 4 };
+    let source: Vec<f32> = (0..SIDE * SIDE).map(|i| ((i % SIDE * (i / SIDE)) % 11) as f32).collect();
+    let mask: Vec<f32> = (0..SIDE * SIDE).map(|i| if i % SIDE < 50 { 1.0 } else { 0.0 }).collect();
+    let statistics = Statistics::measure(&source, SIDE, Some(&mask), &params.texture)?;
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
+    let image = Synthesizer::new(SIDE, SIDE, &params)?.synthesize(&statistics, &mut rng)?;
+    let pixels = Hash::default().bytes(image.iter().map(|v| v.to_bits().to_le_bytes()));
+    Ok([("statistics", Hash::default().text(&format!("{statistics:?}")).hex()), ("pixels", pixels.hex())])
 }
 
 /// Returns small fields that cover every model of light, colour and stack, and every kind of object.

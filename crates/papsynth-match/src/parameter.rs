@@ -130,8 +130,8 @@ parameters! {
     CellEdge: Simulated, Field, Logarithmic 0.8..8.0 "um", "cytoplasm.rim_um";
     /// Strength of the structures of the cytoplasm, relative to the initial recipe.
     Structure: Simulated, Field, Logarithmic 0.2..3.0 "", "cytoplasm.clouds, flecks, cytoskeleton: factor";
-    /// Strength of the fine grain of the cytoplasm, relative to the initial recipe.
-    Grain: Simulated, Field, Logarithmic 0.1..6.0 "", "cytoplasm.grain: factor";
+    /// Strength of the fine texture of the cytoplasm, relative to the initial recipe.
+    FineTexture: Simulated, Field, Logarithmic 0.1..6.0 "", "cytoplasm.texture: factor";
     /// Number of cells.
     Cells: Simulated, Field, Logarithmic 40.0..700.0 "/mm2", "cells.*.count: all classes";
     /// Fraction of superficial cells among superficial and intermediate cells.

@@ -316,7 +316,7 @@ impl Posterior {
 
 /// Half the width of a 95 % interval, in standard errors: 1.96, times a factor from trials (`examples/recover.rs`),
 /// because the function of the statistics is itself an estimate.
-const HALF_WIDTH: f64 = 1.5 * 1.96;
+const HALF_WIDTH: f64 = 1.65 * 1.96;
 
 /// The mean over fields has no information about a parameter if its standard error is larger than this fraction of that
 /// of the range.

@@ -105,7 +105,7 @@ impl Setting {
             (P::Pyknotic, centre(&base.nucleus.pyknotic)),
             (P::CellEdge, centre(&base.cytoplasm.rim_um)),
             (P::Structure, 1.0),
-            (P::Grain, 1.0),
+            (P::FineTexture, 1.0),
             (P::Cells, counts),
             (P::Superficial, superficial / (superficial + intermediate).max(1e-9)),
             (P::Lesion, lesions / counts.max(1e-9)),
@@ -194,8 +194,8 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
             *number = cut(times(number, factor), 0.0, most);
         }
     }
-    if on(P::Grain) {
-        r.cytoplasm.grain = cut(times(&r.cytoplasm.grain, get(P::Grain)), 0.0, 2.0);
+    if on(P::FineTexture) {
+        r.cytoplasm.texture = cut(times(&r.cytoplasm.texture, get(P::FineTexture)), 0.0, 20.0);
     }
     cells(&mut r, &setting.base, values, &on, &or_base);
     // Returns the distribution for a value and the initial distribution.
@@ -481,7 +481,8 @@ mod tests {
         let values = Values::at(&std::array::from_fn(|i| 0.2 + 0.6 * (i as f64) / PARAMETERS.len() as f64));
         let made = recipe(&setting, &values, |_| true);
         let back = Setting { base: made, ..setting }.base_values();
-        for parameter in PARAMETERS.into_iter().filter(|p| !matches!(p, P::Pixel | P::Structure | P::Grain | P::Lesion))
+        for parameter in
+            PARAMETERS.into_iter().filter(|p| !matches!(p, P::Pixel | P::Structure | P::FineTexture | P::Lesion))
         {
             let (a, b) = (values.get(parameter), back.get(parameter));
             assert!((a - b).abs() < 0.03 * a.abs() + 0.01, "{parameter:?}: {a} {b}");

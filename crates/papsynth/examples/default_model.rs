@@ -93,7 +93,8 @@ fn main() {
     let reference = Path::new(&reference);
     let mut cells = outlines(&reference.join("outlines/cytoplasm.csv"));
     cells.remove(TWO_CELLS - 1);
-    let mut model = Model { version: MODEL_VERSION, provenance: Vec::new(), classes: BTreeMap::new() };
+    let mut model =
+        Model { version: MODEL_VERSION, provenance: Vec::new(), classes: BTreeMap::new(), cytoplasm_texture: None };
     for published in &CLASSES {
         let nuclei = nuclei(&reference.join(published.nuclei[0]));
         let nucleus_outlines = outlines(&reference.join(published.nuclei[1]));

@@ -65,7 +65,7 @@ const CHOICES: [(&str, &[&str]); 21] = [
     ("nucleus.restore", &["before-detection", "after-detection", "off"]),
     ("cells.intermediate.group.form", &["single", "aggregate", "honeycomb", "palisade"]),
     ("focus.output", &["planes", "edf"]),
-    ("debris.leukocytes.form", &["round", "lobed"]),
+    ("debris.leukocytes.form", &["round", "lobed", "kidney"]),
     ("debris.speckles.form", &["round", "dilated"]),
     ("camera.photon_noise", &["exact", "normal", "off"]),
     ("camera.binning", &["charge", "digital"]),

@@ -143,7 +143,7 @@ fn detail() -> Outcome<GrayImage> {
         recipe.cytoplasm.clouds = strength(level == 0 || level == 3, 0.25);
         recipe.cytoplasm.flecks = strength(level == 1 || level == 3, 0.6);
         recipe.cytoplasm.cytoskeleton = strength(level == 2 || level == 3, 0.45);
-        recipe.cytoplasm.grain = 0.0.into();
+        recipe.cytoplasm.texture = 0.0.into();
         recipe.cytoplasm.granular = 0.0.into();
         recipe.cytoplasm.folds.flap = 0.0.into();
         recipe.cytoplasm.folds.roll = 0.0.into();

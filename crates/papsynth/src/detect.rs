@@ -15,6 +15,9 @@ const NORMAL_ABOVE_E: f64 = 400.0;
 /// Full-well capacity relative to the charge of the highest grey level: the converter clips first, as in real cameras.
 const WELL_MARGIN: f64 = 1.02;
 
+/// Largest full-well capacity of the camera model, electrons.
+const MAX_WELL_E: f64 = 1e7;
+
 /// Bit depth of the converter of a camera that computes colours or fused planes from its grey levels.
 const INNER_BITS: u32 = 16;
 
@@ -256,7 +259,7 @@ impl Channel {
             prnu: camera.prnu,
             dsnu_e: camera.dsnu_e,
             serial: camera.serial,
-            full_well_e: camera.full_well_e * WELL_MARGIN,
+            full_well_e: (camera.full_well_e * WELL_MARGIN).min(MAX_WELL_E),
             blooming: match camera.blooming {
                 0.0 => Blooming::Off,
                 fraction => Blooming::On { vertical: camera.blooming_vertical, anti_blooming: 1.0 - fraction },

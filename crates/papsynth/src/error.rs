@@ -149,6 +149,43 @@ pub enum ErrorKind {
         cause: NucleusError,
     },
 
+    /// The pixel size of images of cytoplasm is out of range.
+    #[error("pixel size: {0} µm is out of range for the texture of cytoplasm: expected 0.2 to 0.5")]
+    TexturePixel(f64),
+    /// The parts of an image of cytoplasm have different sizes.
+    #[error("{0}: absorbance, mean and mask differ in size, or the size is not a multiple of the width")]
+    CytoplasmSize(String),
+    /// The images show too little cytoplasm.
+    #[error(
+        "{found} areas of cytoplasm of 64 x 64 pixels without nuclei, folds and borders; expected at least {least}: give \
+         more fields"
+    )]
+    LittleCytoplasm {
+        /// Number of areas.
+        found: usize,
+        /// Minimum number.
+        least: usize,
+    },
+    /// The model does not have a kind of texture of a scene.
+    #[error("textures: the model has no texture of cytoplasm `{0}`")]
+    ForeignTexture(String),
+    /// The texture of cytoplasm has no kind.
+    #[error("cytoplasm_texture.kinds: expected at least 1 kind, found none")]
+    NoTexture,
+    /// A texture has the wrong number of octaves.
+    #[error("{field}: expected {expected} numbers, found {found}")]
+    Octaves {
+        /// Path of the list.
+        field: String,
+        /// Its length.
+        found: usize,
+        /// The expected length.
+        expected: usize,
+    },
+    /// The statistics of a texture are invalid, or cannot be measured.
+    #[error("texture: {0}")]
+    CytoplasmTexture(#[source] steerable_texture::Error),
+
     /// The file of the layout was not given.
     #[error("layout.path: the content of \"{path}\" is missing in the inputs of the engine; expected {what}")]
     NotGiven {

@@ -8,11 +8,11 @@ use super::values::parse_pixel;
 
 /// Learn a class of cells from real images and outlines.
 ///
-/// Reads nuclei with masks, and cytoplasm as outlines or label images, and writes a model file for `papsynth generate
-/// --model`. Properties without data keep the values of the base model.
+/// Reads nuclei with masks, and cytoplasm as outlines, label images or fields, and writes a model file for `papsynth
+/// generate --model`. Properties without data keep the values of the base model.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("material").required(true).multiple(true)
-    .args(["nuclei", "nucleus_outlines", "outlines", "labels"]), after_help = "\
+    .args(["nuclei", "nucleus_outlines", "outlines", "labels", "cytoplasm"]), after_help = "\
 Examples:
   papsynth learn --class intermediate --nuclei nuclei --outlines cells.csv --pixel-um 0.25 \\
       --out mine.json
@@ -20,14 +20,15 @@ Examples:
       --base mine.json --numbers-only --out mine.json
   papsynth learn --class parabasal --like intermediate --labels fields --pixel-um 0.33 \\
       --out mine.json
+  papsynth learn --cytoplasm fields --pixel-um 0.33 --out mine.json
 
 Images are grey PNG, JPEG or TIFF files; masks and label images are 0 outside the objects. An
 outline file is a CSV file with the columns outline, k, x_px, y_px: name of the outline, index of the
 point from 0, and its position in pixels.")]
 pub(crate) struct Learn {
     /// Class to learn: a new class, or a class of the base model to replace
-    #[arg(long, value_name = "NAME", value_parser = parse_class)]
-    pub(crate) class: String,
+    #[arg(long, value_name = "NAME", value_parser = parse_class, required_unless_present = "cytoplasm")]
+    pub(crate) class: Option<String>,
     /// Folder of nuclei, with the subfolders `images` and `masks` of files with equal names
     #[arg(long, value_name = "DIR")]
     pub(crate) nuclei: Option<PathBuf>,
@@ -43,6 +44,10 @@ pub(crate) struct Learn {
     /// Folder of label images of cells; cells at the border of an image are ignored
     #[arg(long, value_name = "DIR")]
     pub(crate) labels: Option<PathBuf>,
+    /// Folder of fields whose cytoplasm shows the texture of all classes; PNG, JPEG or TIFF, with or without centres of
+    /// nuclei, as for `papsynth judge`
+    #[arg(long, value_name = "DIR")]
+    pub(crate) cytoplasm: Option<PathBuf>,
     /// Pixel size of all images and outlines, in micrometres
     #[arg(long, value_name = "UM", value_parser = parse_pixel)]
     pub(crate) pixel_um: f64,

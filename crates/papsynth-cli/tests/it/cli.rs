@@ -546,6 +546,37 @@ fn a_class_is_learned_from_outlines_and_used() {
 }
 
 #[test]
+fn the_texture_of_cytoplasm_is_learned_from_fields_and_used() {
+    let bench = Bench::new("learn-cytoplasm");
+    fs::create_dir_all(bench.path("fields")).unwrap();
+    // A large pale sheet with coarse grains on an empty slide.
+    let grain = |x: u32, y: u32| u8::try_from(((x / 2) * 7919 + (y / 2) * 104_729 + (x / 2) * (y / 2)) % 17).unwrap();
+    for name in ["fields/a.png", "fields/b.png"] {
+        bench.grey_png(
+            name,
+            420,
+            300,
+            |x, y| if x > 90 && y > 10 { 165 + grain(x, y) } else { 228 + (grain(y, x) / 8) },
+        );
+    }
+    let run = bench.good("learn --cytoplasm fields --pixel-um 0.33 --out model.json");
+    assert!(run.out.contains("texture of cytoplasm from 2 fields"), "{}", run.out);
+    let model = papsynth::model::Model::from_json(&fs::read_to_string(bench.path("model.json")).unwrap()).unwrap();
+    assert!(model.provenance.iter().any(|p| p.what == "texture of cytoplasm" && p.source == "fields"));
+    assert_ne!(model.cytoplasm_texture, papsynth::model::Model::builtin().cytoplasm_texture);
+    bench.good(&format!("generate --model model.json --out out --frames 1 {TINY}"));
+    // Fields without cytoplasm, and a pixel size without texture, are errors.
+    fs::create_dir_all(bench.path("empty")).unwrap();
+    bench.grey_png("empty/a.png", 300, 300, |x, y| 228 + grain(x, y) / 8);
+    let run = bench.run("learn --cytoplasm empty --pixel-um 0.33 --out no.json");
+    assert_eq!(run.code, 2);
+    assert!(run.err.contains("0 areas of cytoplasm"), "{}", run.err);
+    let run = bench.run("learn --cytoplasm fields --pixel-um 0.9 --out no.json");
+    assert!(run.code == 2 && run.err.contains("expected 0.2 to 0.5"), "{}", run.err);
+    assert!(!bench.path("no.json").exists());
+}
+
+#[test]
 fn a_class_is_learned_from_nuclei_and_label_images() {
     let bench = Bench::new("learn-images");
     for folder in ["nuclei/images", "nuclei/masks", "labels"] {

@@ -9,12 +9,16 @@ use crate::number::{single, whole};
 pub struct BareCytoplasm {
     /// Absorbance relative to the empty slide, row by row.
     pub absorbance: Vec<f32>,
+    /// Local mean of the absorbance of these areas: Gaussian weights with a standard deviation of 2.7 µm.
+    pub mean: Vec<f32>,
     /// Columns.
     pub width: usize,
     /// 1 in these areas, 0 elsewhere.
     pub mask: Vec<f32>,
     /// Standard deviation of the noise of the empty slide, absorbance; NaN if unknown.
     pub noise: f64,
+    /// Median blur of edges, standard deviation in pixels; NaN if unknown.
+    pub blur_px: f64,
 }
 
 /// Range of the absorbance of cytoplasm.
@@ -38,7 +42,7 @@ const DISTANCES_UM: [f64; 3] = [2.0, 3.0, 1.6];
 
 impl BareCytoplasm {
     /// Finds the areas. `ids` are the numbers of nuclei, 0 elsewhere.
-    pub(super) fn new(maps: Maps, ids: &[u32], noise_dn: f64, pixel_um: f64) -> Self {
+    pub(super) fn new(maps: Maps, ids: &[u32], noise_dn: f64, blur_px: f64, pixel_um: f64) -> Self {
         let width = maps.width;
         let px = |um: f64| um / pixel_um;
         let mean = blur(&maps.absorbance, width, px(MEAN_UM));
@@ -61,7 +65,10 @@ impl BareCytoplasm {
         // Grey levels of 255 to absorbance at the light of the empty slide.
         let level = 255.0 * maps.background.mean();
         let noise = noise_dn / (level.max(1.0) * std::f64::consts::LN_10);
-        Self { absorbance: maps.absorbance, width, mask, noise }
+        let inside = |values: &[f32]| blur(values, width, px(MEAN_UM));
+        let weighted: Vec<f32> = maps.absorbance.iter().zip(&mask).map(|(a, m)| a * m).collect();
+        let mean = inside(&weighted).iter().zip(inside(&mask)).map(|(sum, weight)| sum / weight.max(1e-6)).collect();
+        Self { absorbance: maps.absorbance, mean, width, mask, noise, blur_px }
     }
 }
 
@@ -104,12 +111,13 @@ mod tests {
         });
         let ids: Vec<u32> =
             (0..220 * 200).map(|i| u32::from(nucleus(f64::from(i % 220), f64::from(i / 220)))).collect();
-        let found = BareCytoplasm::new(maps, &ids, 1.0, 0.33);
+        let found = BareCytoplasm::new(maps, &ids, 1.0, 0.6, 0.33);
         assert!((found.noise - 1.0 / (240.0 * std::f64::consts::LN_10)).abs() < 1e-4, "{}", found.noise);
         let mut area = 0.0;
         for (i, kept) in found.mask.iter().enumerate() {
             let (x, y) = ((i % 220) as f64, (i / 220) as f64);
             assert!(*kept == 0.0 || (inside(x, y) && !nucleus(x, y) && !fold(x)), "{x} {y}");
+            assert!(*kept == 0.0 || (found.mean[i] - 0.15).abs() < 0.01, "{x} {y}: {}", found.mean[i]);
             area += kept;
         }
         assert!(area > 0.4 * 20_000.0, "{area}");

@@ -219,7 +219,9 @@ impl Measurer {
         let regions = self.nuclei(&maps, &image.nuclei);
         let ids = ids(&maps, &regions);
         let noise_dn = statistics::empty_noise(&maps).map_or(f64::NAN, |noise| noise.variance.sqrt());
-        Ok(BareCytoplasm::new(maps, &ids, noise_dn, self.params.pixel_um))
+        let sigmas = crate::statistics::sorted(maps.edges.iter().map(|e| e.sigma));
+        let blur_px = maps::width_at(&sigmas, 0.5);
+        Ok(BareCytoplasm::new(maps, &ids, noise_dn, blur_px, self.params.pixel_um))
     }
 
     /// Measures several images in parallel. `read` returns the image of an item, so that not all images are in memory

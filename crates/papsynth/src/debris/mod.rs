@@ -26,6 +26,7 @@ mod scratch;
 mod smudge;
 mod speckle;
 mod trichomonad;
+mod tuft;
 
 use serde::{Deserialize, Serialize};
 

@@ -323,3 +323,123 @@ fn at_most_half_a_percent_of_cells_exceeds_its_maximum_radius() {
     }
     assert!(beyond * 100 <= total && largest > 0.6, "{beyond} of {total}, {largest}");
 }
+
+/// Draws a scene with this many clusters of leukocytes, on a fine grid.
+fn leukocytes(clusters: f64, members: f64) -> Scene {
+    let mut debris = Debris::none();
+    (debris.leukocytes.clusters, debris.leukocytes.per_cluster) = (clusters.into(), members.into());
+    let mut recipe = recipe(debris);
+    recipe.field.pixel_um = 0.25.into();
+    scene::draw(&recipe, &Model::builtin(), None, KEY).unwrap()
+}
+
+/// Returns the leukocytes of a scene with the clusters and centres of their objects, µm.
+fn bodies(scene: &Scene) -> Vec<(u32, [f64; 2], &Leukocyte)> {
+    let objects = scene.objects.iter().filter_map(|object| match &object.body {
+        Body::Leukocyte(body) => Some((object.cluster, object.centre_um, body)),
+        _ => None,
+    });
+    objects.collect()
+}
+
+/// Returns the squared distance of two points.
+fn square(a: [f64; 2], b: [f64; 2]) -> f64 {
+    let (dx, dy) = (a[0] - b[0], a[1] - b[1]);
+    dx * dx + dy * dy
+}
+
+#[test]
+fn nuclei_of_leukocytes_have_the_measured_areas() {
+    let scene = leukocytes(300.0, 1.0);
+    let intact: Vec<bool> = bodies(&scene).iter().map(|(.., body)| !body.degenerated).collect();
+    let [mut all, mut whole_cells] = [Vec::new(), Vec::new()];
+    let drawn = phantoms(&scene).into_iter().filter(|(kind, _)| *kind == ObjectKind::Leukocyte);
+    for ((_, phantom), intact) in drawn.zip(intact) {
+        let [whole, nucleus] = &phantom.pieces[..] else { panic!("a leukocyte has a cytoplasm and a nucleus") };
+        assert!(phantom.traits.contains(&Trait::Degenerated) != intact);
+        let mut values: Vec<f32> = nucleus.absorbance.values.iter().copied().filter(|value| *value > 0.0).collect();
+        values.sort_by(f32::total_cmp);
+        let dark = values[values.len() * 9 / 10];
+        let inside = values.iter().filter(|value| **value > 0.5 * dark).count();
+        let grid_um = scene.view.pixel_um / (scene.oversampling() / nucleus.step) as f64;
+        if intact && !phantom.traits.contains(&Trait::Histiocyte) {
+            all.push(inside as f64 * grid_um * grid_um);
+            whole_cells.push(whole.area_px * grid_um * grid_um);
+        }
+        // The mask of the object contains its nucleus.
+        for (value, share) in nucleus.absorbance.values.iter().zip(&whole.coverage.values) {
+            assert!(*value == 0.0 || *share > 0.0);
+        }
+    }
+    let quantile = |areas: &mut Vec<f64>, fraction: f64| {
+        areas.sort_by(f64::total_cmp);
+        areas[(fraction * (areas.len() - 1) as f64).round() as usize]
+    };
+    // Measured at 10 %, 50 % and 90 %: 26, 39 and 51 µm², with the darkest part of the cytoplasm.
+    for (fraction, least, most) in [(0.1, 18.0, 32.0), (0.5, 30.0, 44.0), (0.9, 38.0, 58.0)] {
+        let area = quantile(&mut all, fraction);
+        assert!((least..=most).contains(&area), "{fraction}: {area}");
+    }
+    let cell = quantile(&mut whole_cells, 0.5);
+    assert!((60.0..=110.0).contains(&cell), "{cell}");
+}
+
+#[test]
+fn clumps_of_leukocytes_are_compact_and_their_members_touch() {
+    let mut debris = Debris::none();
+    (debris.leukocytes.clusters, debris.leukocytes.per_cluster) = (20.0.into(), 24.0.into());
+    (debris.leukocytes.touching, debris.leukocytes.histiocytes) = (1.0.into(), 0.0.into());
+    let scene = draw(&debris);
+    let bodies = bodies(&scene);
+    for cluster in 1..=20 {
+        let members: Vec<_> = bodies.iter().filter(|(of, ..)| *of == cluster).collect();
+        assert_eq!(members.len(), 24);
+        let mut apart = 0;
+        let diameter = members.iter().map(|(.., body)| body.cytoplasm_diameter_um).sum::<f64>() / 24.0;
+        let mut nearest = Vec::new();
+        for (i, (_, at, body)) in members.iter().enumerate().skip(1) {
+            let before = members[..i].iter().map(|(_, other, _)| square(*at, *other).sqrt()).fold(f64::MAX, f64::min);
+            assert!(before <= 1.05 * body.cytoplasm_diameter_um + 1e-9, "{before}");
+            apart += usize::from(before >= 0.6 * body.cytoplasm_diameter_um - 1e-9);
+            nearest.push(before);
+        }
+        assert!(apart >= 20, "{apart} of 23 have a minimum distance");
+        // Distances differ: clumps are no lattice.
+        let mean = nearest.iter().sum::<f64>() / nearest.len() as f64;
+        let spread = (nearest.iter().map(|d| (d - mean) * (d - mean)).sum::<f64>() / nearest.len() as f64).sqrt();
+        assert!(spread > 0.06 * mean, "{spread} of {mean}");
+        let middle = members.iter().fold([0.0; 2], |m, (_, at, _)| [m[0] + at[0] / 24.0, m[1] + at[1] / 24.0]);
+        let moment = members.iter().map(|(_, at, _)| square(*at, middle)).sum::<f64>() / 24.0;
+        // A disc of 24 touching discs has a standard deviation of 1.7 diameters.
+        assert!(moment.sqrt() < 2.4 * diameter, "{} of {diameter}", moment.sqrt());
+    }
+}
+
+#[test]
+fn sizes_of_clusters_of_leukocytes_have_a_heavy_tail() {
+    let mut rng = KEY.stream("test", 0, "clusters");
+    let members = Debris::default().leukocytes.per_cluster;
+    let sizes: Vec<usize> = (0..4000).map(|_| members.draw_count(&mut rng).max(1)).collect();
+    let share = |from: usize| sizes.iter().filter(|size| **size >= from).count() as f64 / 4000.0;
+    assert!((0.28..0.44).contains(&share(2)), "{}", share(2));
+    assert!((0.008..0.03).contains(&share(11)), "{}", share(11));
+}
+
+#[test]
+fn every_variant_of_leukocytes_and_debris_occurs() {
+    let scene = leukocytes(400.0, 1.0);
+    let bodies = bodies(&scene);
+    let share = |which: fn(&Leukocyte) -> bool| {
+        bodies.iter().filter(|(.., body)| which(body)).count() as f64 / bodies.len() as f64
+    };
+    assert!((0.17..0.31).contains(&share(|body| body.degenerated)));
+    assert!((0.05..0.16).contains(&share(|body| body.pyknotic)));
+    assert!((0.01..0.08).contains(&share(|body| body.form == NucleusForm::Kidney)));
+    assert!((0.22..0.38).contains(&share(|body| body.remains)));
+    assert!(bodies.iter().all(|(.., body)| body.degenerated || !body.pyknotic));
+    let mut debris = Debris::none();
+    debris.smudges.count = 200.0.into();
+    let scene = draw(&debris);
+    let fibrous = scene.objects.iter().filter(|o| matches!(&o.body, Body::Smudge(smudge) if smudge.fibrous)).count();
+    assert!((30..70).contains(&fibrous), "{fibrous}");
+}

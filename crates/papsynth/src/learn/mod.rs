@@ -3,6 +3,7 @@
 //! This module reads no files: images are slices, outlines are lists of points.
 
 mod chromatin;
+mod cytoplasm;
 mod nucleus;
 
 use fsd_shape::{CovarianceModel, ShapeModel, ShapeModelParams};
@@ -10,6 +11,7 @@ use fsd_shape::{CovarianceModel, ShapeModel, ShapeModelParams};
 use crate::error::{Error, ErrorKind};
 use crate::model::{CellClass, Donor, LogNormal, Model, Normal, Provenance, Shapes};
 
+pub use cytoplasm::{CytoplasmImage, CytoplasmParams, learn_cytoplasm};
 use nucleus::NucleusMeasurement;
 pub use nucleus::{NucleusImage, Point};
 

@@ -1,8 +1,10 @@
 //! The built-in model, and class files: TOML files that define classes by their differences from other classes.
 
+use std::sync::OnceLock;
+
 use serde_json::{Map, Value};
 
-use super::{CellClass, MODEL_VERSION, Model, Provenance};
+use super::{CellClass, CytoplasmTexture, MODEL_VERSION, Model, Provenance};
 use crate::error::{Error, ErrorKind};
 
 /// Class files of the built-in model.
@@ -11,14 +13,36 @@ const BUILTIN_CLASSES: [&str; 2] = [include_str!("../../model/cervix.toml"), inc
 /// The learned part of the built-in model.
 const BUILTIN: &str = include_str!("../../model/default.json");
 
+/// The texture of cytoplasm of the built-in model.
+const BUILTIN_TEXTURE: &str = include_str!("../../model/cytoplasm.json");
+
+/// Returns the texture of cytoplasm of the built-in model.
+fn builtin_texture() -> &'static CytoplasmTexture {
+    static TEXTURE: OnceLock<CytoplasmTexture> = OnceLock::new();
+    TEXTURE.get_or_init(|| serde_json::from_str(BUILTIN_TEXTURE).expect("the built-in texture is valid"))
+}
+
+impl CytoplasmTexture {
+    /// Returns whether this is the texture of the built-in model.
+    pub(crate) fn is_builtin(&self) -> bool {
+        self == builtin_texture()
+    }
+}
+
 impl Model {
+    /// Returns the texture of cytoplasm.
+    pub(crate) fn texture(&self) -> &CytoplasmTexture {
+        self.cytoplasm_texture.as_ref().unwrap_or_else(|| builtin_texture())
+    }
+
     /// Returns the built-in model. It contains only statistics, measured on real cells.
     ///
     /// # Panics
     /// Never: the files are part of the crate and tested.
     #[must_use]
     pub fn builtin() -> Self {
-        let learned = Self::from_json(BUILTIN).expect("the built-in model is valid");
+        let mut learned = Self::from_json(BUILTIN).expect("the built-in model is valid");
+        learned.cytoplasm_texture = Some(builtin_texture().clone());
         // `Engine::new` checks the values.
         BUILTIN_CLASSES
             .iter()
@@ -75,6 +99,9 @@ fn merged(base: &Model, text: &str) -> Result<Model, ErrorKind> {
         Some(_) => return Err(ErrorKind::ClassesNotATable),
         None => Map::new(),
     };
+    if let Some(texture) = file.remove("cytoplasm_texture") {
+        model.cytoplasm_texture = serde_json::from_value(texture)?;
+    }
     if let Some(unknown) = file.keys().next() {
         return Err(ErrorKind::UnknownField(unknown.clone()));
     }

@@ -26,6 +26,38 @@ pub struct Model {
     pub provenance: Vec<Provenance>,
     /// Classes of cells by name.
     pub classes: BTreeMap<String, CellClass>,
+    /// Texture of the cytoplasm of all classes; that of the built-in model if missing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cytoplasm_texture: Option<CytoplasmTexture>,
+}
+
+/// Texture of cytoplasm: the relative deviation of the absorbance from its local mean.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CytoplasmTexture {
+    /// Pixel size of the statistics, µm.
+    pub pixel_um: f64,
+    /// Standard deviation between fields of the logarithm of the strength.
+    pub field_log_sd: f64,
+    /// Kinds of texture.
+    pub kinds: Vec<TextureKind>,
+}
+
+/// A kind of texture of cytoplasm.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TextureKind {
+    /// Name: "granular", "fibrillar", …
+    pub name: String,
+    /// Relative frequency.
+    pub weight: f64,
+    /// Standard deviation of the texture relative to the absorbance of the cytoplasm, and its variation in a field.
+    pub strength: LogNormal,
+    /// Standard deviations of octaves in the object relative to the strength, from fine to coarse: the high-pass
+    /// residual, each scale, the low-pass residual.
+    pub octaves: Vec<f64>,
+    /// Joint statistics of a steerable pyramid, as imaged.
+    pub statistics: steerable_texture::Statistics,
 }
 
 /// One data source of a model.
@@ -285,13 +317,37 @@ impl Model {
             }
             class.check(&format!("classes.{name}"))?;
         }
-        Ok(())
+        self.cytoplasm_texture.as_ref().map_or(Ok(()), |texture| texture.check("cytoplasm_texture"))
     }
 
     /// Returns a class by name.
     pub(crate) fn class(&self, name: &str) -> Result<&CellClass, ErrorKind> {
         let known = || self.classes.keys().cloned().collect();
         self.classes.get(name).ok_or_else(|| ErrorKind::UnknownClass(name.to_owned(), known()))
+    }
+}
+
+impl CytoplasmTexture {
+    fn check(&self, path: &str) -> Result<(), ErrorKind> {
+        within(&format!("{path}.pixel_um"), self.pixel_um, [0.05, 2.0])?;
+        within(&format!("{path}.field_log_sd"), self.field_log_sd, [0.0, 2.0])?;
+        if self.kinds.is_empty() {
+            return Err(ErrorKind::NoTexture);
+        }
+        let mut total = 0.0;
+        for (i, kind) in self.kinds.iter().enumerate() {
+            let at = |field: &str| format!("{path}.kinds[{i}].{field}");
+            total += kind.weight;
+            within(&at("weight"), kind.weight, [0.0, 1e6])?;
+            kind.strength.check(&at("strength"), 0.0, 2.0)?;
+            kind.statistics.check().map_err(ErrorKind::CytoplasmTexture)?;
+            let expected = kind.statistics.params.pyramid.scales + 2;
+            if kind.octaves.len() != expected {
+                return Err(ErrorKind::Octaves { field: at("octaves"), found: kind.octaves.len(), expected });
+            }
+            kind.octaves.iter().try_for_each(|octave| within(&at("octaves"), *octave, [0.0, 100.0]))?;
+        }
+        within(&format!("{path}.kinds: the sum of all weights"), total, [1e-6, 1e9])
     }
 }
 

@@ -10,6 +10,7 @@ use voronoi_cytoskeleton::{DescentPath, Skeleton, SkeletonParams, Torus};
 
 use super::chromatin::DonorSet;
 use super::noise_fields::NoiseFieldGenerator;
+use super::texture_pool::TexturePools;
 use super::tile::Point;
 use crate::error::ErrorKind;
 use crate::key::{Key, Stream};
@@ -27,6 +28,7 @@ pub(crate) struct PhantomAssets {
     pub(crate) cloth: Option<Cloth>,
     pub(crate) cytoskeletons: Cytoskeletons,
     pub(crate) noise_fields: NoiseFieldGenerator,
+    pub(crate) textures: TexturePools,
     pub(crate) timer: StageTimer,
 }
 
@@ -71,6 +73,7 @@ impl PhantomAssets {
             cloth: cloth.map(|params| Cloth::new(&params).expect("the built-in cloth parameters are valid")),
             cytoskeletons: Cytoskeletons::new(),
             noise_fields: NoiseFieldGenerator::new(),
+            textures: TexturePools::new(model.texture()),
             timer,
         })
     }

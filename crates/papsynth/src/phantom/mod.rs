@@ -14,6 +14,7 @@ pub(crate) mod noise_fields;
 mod nucleus;
 pub(crate) mod parametric_shape;
 pub(crate) mod piece;
+mod texture_pool;
 pub(crate) mod tile;
 
 use crate::debris::{ObjectContext, add_coat};

@@ -13,21 +13,17 @@ use crate::random;
 /// Width and height of a noise field in texels: a power of two, so that positions wrap by masking.
 pub(crate) const SIDE: usize = 512;
 
-/// Texel size of the flecks and grain fields, µm.
+/// Texel size of the flecks, µm.
 const TEXEL_UM: f64 = 0.25;
 
 /// Smoothing of the clouds field, standard deviation in texels.
 const CLOUD_SIGMA: f64 = 6.0;
 
-/// Correlation length of the grain, texels. The spectrum of cytoplasm in real fields, divided by that of the optics, is
-/// nearly flat from 0.4 to 1 cycle per µm.
-const GRAIN_LENGTH: f64 = 0.3;
-
 /// Plans and spectra of the noise fields, the same for every image.
 #[derive(Debug)]
 pub(crate) struct NoiseFieldGenerator {
-    /// Clouds, flecks and grain.
-    fields: [SpectralField; 3],
+    /// Clouds and flecks.
+    fields: [SpectralField; 2],
 }
 
 /// The noise fields of one image, with mean 0, variance 1 and a period of [`SIDE`] texels. Each is computed on first
@@ -36,7 +32,7 @@ pub(crate) struct NoiseFieldGenerator {
 pub(crate) struct NoiseFields<'a> {
     generator: &'a NoiseFieldGenerator,
     key: Key,
-    drawn: [OnceLock<NoiseField>; 3],
+    drawn: [OnceLock<NoiseField>; 2],
 }
 
 /// A periodic field.
@@ -73,11 +69,7 @@ const SUBTEXEL: f64 = 0.211_324_865_405_187_1;
 
 impl NoiseFieldGenerator {
     pub(crate) fn new() -> Self {
-        let spectra = [
-            Spectrum::Gaussian { sigma_px: CLOUD_SIGMA },
-            Spectrum::BROWNIAN,
-            Spectrum::Matern { nu: 0.5, length_px: GRAIN_LENGTH },
-        ];
+        let spectra = [Spectrum::Gaussian { sigma_px: CLOUD_SIGMA }, Spectrum::BROWNIAN];
         let fields = spectra.map(|spectrum| {
             let params = FieldParams { width: SIDE, height: SIDE, spectrum, padding: Padding::Periodic };
             SpectralField::new(&params).expect("a field of this size is valid")
@@ -90,11 +82,6 @@ impl NoiseFieldGenerator {
     }
 }
 
-/// Returns the standard deviation of the mean of the grain over a pixel.
-pub(crate) fn grain_of_pixel(pixel_um: f64) -> f64 {
-    (TEXEL_UM / pixel_um).min(1.0)
-}
-
 impl NoiseFields<'_> {
     pub(crate) fn clouds(&self) -> &NoiseField {
         self.noise_field(0, "pool.clouds")
@@ -102,10 +89,6 @@ impl NoiseFields<'_> {
 
     pub(crate) fn flecks(&self) -> &NoiseField {
         self.noise_field(1, "pool.flecks")
-    }
-
-    pub(crate) fn grain(&self) -> &NoiseField {
-        self.noise_field(2, "pool.grain")
     }
 
     fn noise_field(&self, which: usize, purpose: &str) -> &NoiseField {
@@ -130,7 +113,7 @@ impl FieldSampler {
         Self { step: self.step.map(|step| n * step), ..*self }
     }
 
-    /// Draws a sampler for flecks and grain, with the physical texel size.
+    /// Draws a sampler for flecks, with the physical texel size.
     pub(crate) fn fine<R: Rng + ?Sized>(pixel_um: f64, rng: &mut R) -> Self {
         Self::new(TEXEL_UM / pixel_um, rng)
     }

@@ -10,6 +10,7 @@ const KEYS: &[(&str, &str)] = &[
     ("camera.glare_removed", "camera.glare_subtracted"),
     ("cytoplasm.corners", "cytoplasm.angularity"),
     ("cytoplasm.excess", "cytoplasm.excess_area"),
+    ("cytoplasm.grain", "cytoplasm.texture"),
     ("cytoplasm.folds.cigar", "cytoplasm.folds.folded_over"),
     ("cytoplasm.tongues", "cytoplasm.protrusions"),
     ("cytoplasm.wedge", "cytoplasm.thickness_gradient"),

@@ -292,14 +292,16 @@ section! {
         clouds_um: Number = Number::uniform(3.0, 14.0), 0.1..=100, "µm";
         /// Amplitude of the second level of detail, relative to the absorbance of the cytoplasm: spots, made by
         /// thresholding Brownian noise.
-        flecks: Number = Number::log_normal(0.14, 0.5).at_least(0.0).at_most(0.5), 0..=5;
+        flecks: Number = Number::log_normal(0.08, 0.5).at_least(0.0).at_most(0.5), 0..=5;
         /// Quantile of the Brownian noise at which it is thresholded: the fraction of the cell without spots.
         flecks_threshold: Number = Number::uniform(0.55, 0.85), 0..=0.999;
         /// Amplitude of the third level of detail, the cytoskeleton, relative to the absorbance of the cytoplasm.
         cytoskeleton: Number = Number::uniform(0.05, 0.18), 0..=2;
-        /// Amplitude of the fine grain of the cytoplasm, relative to its absorbance: standard deviation over areas of
-        /// 0.25 µm.
-        grain: Number = Number::uniform(0.2, 0.6), 0..=2;
+        /// Factor on the strength of the fine texture of the cytoplasm in the model: grains, networks and fibres. The
+        /// default gives the spectrum inside cells of real fields.
+        texture: Number
+            (given f64 as texture: "Standard deviation of the fine texture, relative to the absorbance of the cytoplasm.")
+            = 0.8, 0..=20;
         /// Probability that a cell is granular.
         granular: Number (undrawn) = 0.2, 0..=1;
         /// Number of granules of a granular cell per 100 µm².

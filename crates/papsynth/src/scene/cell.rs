@@ -24,6 +24,8 @@ pub struct CellBody {
     pub phase_rad: f64,
     /// Detail of the cytoplasm.
     pub detail: CellDetail,
+    /// Kinds of fine texture of the outer and of the inner cytoplasm, in the model.
+    pub textures: [String; 2],
     /// Cleared space around the nucleus.
     pub halo: Option<Halo>,
     /// Fold.

@@ -6,7 +6,7 @@ use rand_core::Rng;
 
 use crate::error::ErrorKind;
 use crate::key::{Key, Stream};
-use crate::model::{CellClass, HaloStatistics, Model};
+use crate::model::{CellClass, CytoplasmTexture, HaloStatistics, Model, TextureKind};
 use crate::random;
 use crate::recipe::section::named;
 use crate::recipe::{CellMix, GroupForm, Number, Recipe};
@@ -68,7 +68,7 @@ pub(super) fn draw_cells(
     let mut counts = BTreeMap::new();
     let mut groups_begun = 0;
     for (((name, mix), requested), wanted) in recipe.cells.iter().zip(requested).zip(wanted) {
-        let kind = Class { name, mix, class: model.class(name)? };
+        let kind = Class { name, mix, class: model.class(name)?, texture: model.texture() };
         let mut groups = Groups::new(&mix.group, groups_begun);
         let in_margin = mix.count.is_density();
         let before = objects.len();
@@ -129,6 +129,7 @@ pub(super) struct Class<'a> {
     pub(super) name: &'a str,
     pub(super) mix: &'a CellMix,
     pub(super) class: &'a CellClass,
+    pub(super) texture: &'a CytoplasmTexture,
 }
 
 /// A drawn cell without a place.
@@ -184,7 +185,7 @@ fn polar(off_centre: [f64; 2], polarity: f64, rotation_deg: f64) -> [f64; 2] {
 
 fn draw_body(
     recipe: &Recipe,
-    Class { name, mix, class }: Class<'_>,
+    Class { name, mix, class, texture }: Class<'_>,
     stain: &FieldStain<'_>,
     rng: &mut Stream,
     own: impl Fn(&str) -> Stream,
@@ -210,7 +211,14 @@ fn draw_body(
         * libm::exp(stain.cytoplasm_variation * cytoplasm.absorbance.log_sd * random::normal(rng))
         * stain.cytoplasm
         * mix.cytoplasm_stain.draw(rng);
-    let detail = draw_detail(recipe, cytoplasm.pliability, rng, &own);
+    let mut detail = draw_detail(recipe, cytoplasm.pliability, rng, &own);
+    let mut texture_rng = own("texture");
+    let textures = [0, 1].map(|_| drawn_kind(texture, &mut texture_rng));
+    let strength = &textures[0].strength;
+    detail.texture *= strength.median
+        * libm::exp(
+            strength.log_sd * random::normal(&mut texture_rng) + texture.field_log_sd * stain.cytoplasm_texture,
+        );
     let fold = draw_fold(recipe, cytoplasm.pliability, rng);
     let distance = (nucleus.off_centre.mean + nucleus.off_centre.sd * random::normal(rng)).clamp(0.0, 1.0);
     // The nucleus stays inside the cell.
@@ -267,10 +275,21 @@ fn draw_body(
         dyes,
         phase_rad: recipe.cytoplasm.phase_rad.draw(&mut own("phase")),
         detail,
+        textures: textures.map(|kind| kind.name.clone()),
         halo: draw_halo(cytoplasm.halo.as_ref(), nucleus_um, radius_um, &mut own("halo")),
         fold,
         nucleus: body,
     }
+}
+
+/// Draws a kind of texture by its weight.
+fn drawn_kind<'a>(texture: &'a CytoplasmTexture, rng: &mut Stream) -> &'a TextureKind {
+    let mut at = random::uniform(rng) * texture.kinds.iter().map(|kind| kind.weight).sum::<f64>();
+    let found = texture.kinds.iter().find(|kind| {
+        at -= kind.weight;
+        at < 0.0
+    });
+    found.unwrap_or(&texture.kinds[0])
 }
 
 /// Fraction of the variation of the standard deviation of chromatin that is independent of the absorbance.
@@ -303,6 +322,7 @@ fn draw_detail(recipe: &Recipe, pliability: f64, rng: &mut Stream, own: &impl Fn
         endoplasm: own(named!(recipe.cytoplasm.endoplasm)),
         granules: if granular { granules } else { 0.0 },
         rim_um: own(named!(recipe.cytoplasm.rim_um)),
+        texture: own(named!(recipe.cytoplasm.texture)),
         thickness_gradient,
         ..cytoplasm.one(rng)
     }

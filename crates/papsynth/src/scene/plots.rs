@@ -221,7 +221,7 @@ impl Population {
         let (mut tried, mut begun) = (0_u64, 0);
         for (name, mix) in &self.recipe.cells {
             // The engine has checked that the model has the class.
-            let kind = Class { name, mix, class: &self.model.classes[name] };
+            let kind = Class { name, mix, class: &self.model.classes[name], texture: self.model.texture() };
             let path = format!("cells.{name}.count");
             let alone = mix.group.form == GroupForm::Single;
             let size = if alone { 1.0 } else { mean_of(&mix.group.size) };

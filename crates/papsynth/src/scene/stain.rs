@@ -23,6 +23,8 @@ pub(crate) struct FieldStain<'a> {
     pub(crate) nucleus: f64,
     /// Factor on the contrast of the texture inside nuclei.
     pub(super) texture: f64,
+    /// Deviation of the texture of cytoplasm from its mean strength, standard deviations between fields.
+    pub(super) cytoplasm_texture: f64,
     /// Factors on the standard deviations between the cells of a class: of the absorbance of cytoplasm, and of the
     /// absorbance and texture of nuclei.
     pub(super) cytoplasm_variation: f64,
@@ -57,6 +59,7 @@ impl<'a> FieldStain<'a> {
                 * field.draw(named!("stain", stain.field_cytoplasm)),
             nucleus: of_slide(named!("stain", stain.slide_nucleus)) * field.draw(named!("stain", stain.field_nucleus)),
             texture: field.draw(named!("stain", stain.field_texture)),
+            cytoplasm_texture: random::normal(&mut field.key.stream("field", 0, "strength of texture")),
             cytoplasm_variation: field.draw(named!("stain", stain.cytoplasm_variation)),
             nucleus_variation: field.draw(named!("stain", stain.nucleus_variation)),
             balance,

@@ -34,8 +34,10 @@ words! {
         Hypha = "hypha",
         /// A yeast.
         Yeast = "yeast",
-        /// A leukocyte with a smudged nucleus.
+        /// A leukocyte with a smudged or pyknotic nucleus.
         Degenerated = "degenerated",
+        /// A large leukocyte with a kidney-shaped nucleus.
+        Histiocyte = "histiocyte",
     }
 }
 

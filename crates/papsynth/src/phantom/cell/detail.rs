@@ -1,13 +1,14 @@
-//! Detail of cytoplasm: clouds, flecks, grain, cytoskeleton, granules, endoplasm, halo.
+//! Detail of cytoplasm: clouds, flecks, fine texture, cytoskeleton, granules, endoplasm, halo.
 
 use multiversion::multiversion;
 use voronoi_cytoskeleton::{LineParams, draw_into};
 
+use super::fine_texture::FineTexture;
 use crate::error::ErrorKind;
 use crate::key::Stream;
 use crate::phantom::box_sums::{add_row, for_each_row_of_sums};
 use crate::phantom::cell_context::CellContext;
-use crate::phantom::noise_fields::{FieldSampler, NoiseField, SIDE, Texels, grain_of_pixel};
+use crate::phantom::noise_fields::{FieldSampler, NoiseField, SIDE, Texels};
 use crate::phantom::parametric_shape::perturbed_circle;
 use crate::phantom::tile::{Point, Tile, scaled_about};
 use crate::random;
@@ -18,13 +19,18 @@ const GRANULE_UM: f64 = 0.28;
 /// Absorbance of a granule relative to the cytoplasm.
 const GRANULE: f64 = 0.75;
 
-/// Multiplies the thickness by clouds, flecks and grain.
-pub(super) fn add_detail(absorbance: &mut Tile, coverage: &Tile, cell: &CellContext<'_>, rng: &mut Stream) {
+/// Multiplies the thickness by clouds, flecks and the fine texture. `inner` is 1 in the endoplasm and 0 outside.
+pub(super) fn add_detail(
+    absorbance: &mut Tile,
+    coverage: &Tile,
+    inner: Option<CoarseTile>,
+    cell: &CellContext<'_>,
+    rng: &mut Stream,
+) -> Result<(), ErrorKind> {
     let (detail, noise_fields, pixel_um) = (&cell.body.detail, cell.noise_fields, cell.pixel_um());
     let clouds = FieldSampler::clouds(detail.clouds_um / pixel_um, rng);
     let flecks = FieldSampler::fine(pixel_um, rng);
-    let grain = FieldSampler::fine(pixel_um, rng);
-    let grainy = (detail.grain * grain_of_pixel(pixel_um)) as f32;
+    let mut texture = FineTexture::new(cell, inner)?;
     let (cloud, fleck) = (detail.clouds as f32, detail.flecks as f32);
     let threshold = if fleck > 0.0 { noise_fields.flecks().quantile(detail.flecks_threshold) } else { 0.0 };
     let width = absorbance.width;
@@ -36,7 +42,7 @@ pub(super) fn add_detail(absorbance: &mut Tile, coverage: &Tile, cell: &CellCont
     for (y, (row, cover)) in rows.enumerate() {
         let Some((first, end)) = covered(cover) else { continue };
         let at = [first as f64, y as f64];
-        let [of_clouds, of_flecks, of_grain] = &mut fields;
+        let [of_clouds, of_flecks, of_texture] = &mut fields;
         match &mut slow_clouds {
             Some(slow) => slow.row_into(of_clouds, y),
             None if cloud > 0.0 => noise_fields.clouds().row_into(&mut of_clouds[first..end], &clouds, at, &mut texels),
@@ -45,25 +51,26 @@ pub(super) fn add_detail(absorbance: &mut Tile, coverage: &Tile, cell: &CellCont
         if fleck > 0.0 {
             noise_fields.flecks().row_into(&mut of_flecks[first..end], &flecks, at, &mut texels);
         }
-        if grainy > 0.0 {
-            noise_fields.grain().row_into(&mut of_grain[first..end], &grain, at, &mut texels);
+        if let Some(texture) = &mut texture {
+            texture.row_into(of_texture, first..end, y);
         }
-        let fields = [&*of_clouds, of_flecks, of_grain].map(|field| &field[first..end]);
-        modulate(&mut row[first..end], fields, [cloud, fleck, grainy], threshold);
+        let fields = [&*of_clouds, of_flecks, of_texture].map(|field| &field[first..end]);
+        modulate(&mut row[first..end], fields, [cloud, fleck], threshold);
     }
+    Ok(())
 }
 
 /// Smallest standard deviation of the smoothing of clouds that are interpolated from coarse pixels, px: three coarse
 /// pixels. The root mean square error is then a hundredth of the standard deviation of the clouds.
 const SMOOTH_PX: f64 = 3.0 * COARSE as f64;
 
-/// Multiplies a row by 1 plus the clouds, the flecks above a threshold, and the grain, times their strengths. Negative
-/// factors count as 0.
+/// Multiplies a row by 1 plus the clouds and the flecks above a threshold, times their strengths, plus the texture.
+/// Negative factors count as 0.
 #[multiversion(targets = "simd")]
-fn modulate(row: &mut [f32], [clouds, flecks, grain]: [&[f32]; 3], strengths: [f32; 3], threshold: f32) {
-    for (((value, cloud), &fleck), grain) in row.iter_mut().zip(clouds).zip(flecks).zip(grain) {
+fn modulate(row: &mut [f32], [clouds, flecks, texture]: [&[f32]; 3], strengths: [f32; 2], threshold: f32) {
+    for (((value, cloud), &fleck), texture) in row.iter_mut().zip(clouds).zip(flecks).zip(texture) {
         let above = if fleck > threshold { fleck - threshold } else { 0.0 };
-        let factor = 1.0 + strengths[0] * cloud + strengths[1] * above + strengths[2] * grain;
+        let factor = 1.0 + strengths[0] * cloud + strengths[1] * above + texture;
         *value *= if factor > 0.0 { factor } else { 0.0 };
     }
 }
@@ -198,7 +205,7 @@ fn ramp(like: &Tile, polygon: &[Point], centre: Point, inner: f64, outer: f64) -
 }
 
 /// A slowly changing image on a tile, drawn with pixels [`COARSE`] times as large and interpolated linearly.
-struct CoarseTile {
+pub(super) struct CoarseTile {
     /// One pixel of margin surrounds the area of the tile.
     coarse: Tile,
     line: Vec<f32>,
@@ -237,7 +244,7 @@ impl CoarseTile {
     }
 
     /// Writes row `y` of the tile.
-    fn row_into(&mut self, row: &mut [f32], y: usize) {
+    pub(super) fn row_into(&mut self, row: &mut [f32], y: usize) {
         let width = self.coarse.width;
         let [upper, lower] = [0, 1].map(|k| &self.coarse.values[((y + COARSE / 2) / COARSE + k) * width..][..width]);
         mix(&mut self.line, upper, lower, PHASES[y % COARSE]);
@@ -272,11 +279,17 @@ fn interpolate_by_four(row: &mut [f32], coarse: &[f32]) {
     }
 }
 
-/// Adds the endoplasm: the granular inner part of the cytoplasm, denser than the outer part.
-pub(super) fn add_endoplasm(absorbance: &mut Tile, outline: &[Point], nucleus: Point, cell: &CellContext<'_>) {
-    let CellContext { body, noise_fields, .. } = *cell;
+/// Adds the endoplasm: the inner part of the cytoplasm, denser than the outer part. Returns its zone: 1 inside, 0
+/// outside.
+pub(super) fn add_endoplasm(
+    absorbance: &mut Tile,
+    outline: &[Point],
+    nucleus: Point,
+    cell: &CellContext<'_>,
+) -> Option<CoarseTile> {
+    let body = cell.body;
     if body.detail.endoplasm <= 0.0 {
-        return;
+        return None;
     }
     let (pixel_um, rng) = (cell.pixel_um(), &mut cell.stream("endoplasm"));
     let size = random::between(0.45, 0.75, rng);
@@ -294,25 +307,23 @@ pub(super) fn add_endoplasm(absorbance: &mut Tile, outline: &[Point], nucleus: P
     absorbance.blend(&lifted, |values, ramp| {
         values.iter_mut().zip(ramp).for_each(|(value, ramp)| *value *= 1.0 + lift * ramp);
     });
-    let grain = FieldSampler::fine(pixel_um, rng);
     let density = body.detail.endoplasm as f32;
-    let width = absorbance.width;
-    let (mut field, mut zone) = (vec![0.0_f32; width], vec![0.0_f32; width]);
-    let mut texels: Texels = [0.0; SIDE + 1];
-    for (y, row) in absorbance.values.chunks_exact_mut(width).enumerate() {
+    let mut zone = vec![0.0_f32; absorbance.width];
+    for (y, row) in absorbance.values.chunks_exact_mut(zone.len()).enumerate() {
         ramp_of_zone.row_into(&mut zone, y);
-        let Some((first, end)) = covered(&zone) else { continue };
-        let field = &mut field[..end - first];
-        noise_fields.grain().row_into(field, &grain, [first as f64, y as f64], &mut texels);
-        thicken(&mut row[first..end], &zone[first..end], field, density);
+        thicken(row, &zone, INNER * density);
     }
+    Some(ramp_of_zone)
 }
 
-/// Thickens a row by the density of the endoplasm where it is inside, and more where the noise is positive.
+/// Increase of thickness in the endoplasm relative to its density.
+const INNER: f32 = 1.4;
+
+/// Thickens a row by the density of the endoplasm where it is inside.
 #[multiversion(targets = "simd")]
-fn thicken(row: &mut [f32], inside: &[f32], noise: &[f32], density: f32) {
-    for ((value, inside), &noise) in row.iter_mut().zip(inside).zip(noise) {
-        *value *= 1.0 + inside * density * (1.0 + if noise > 0.0 { noise } else { 0.0 });
+fn thicken(row: &mut [f32], inside: &[f32], density: f32) {
+    for (value, inside) in row.iter_mut().zip(inside) {
+        *value *= 1.0 + inside * density;
     }
 }
 

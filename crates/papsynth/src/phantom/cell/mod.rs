@@ -4,6 +4,7 @@
 use cloth_verlet::{Crease, FoldKind, PixelGrid, Sheet, SheetSpec, crease_outline};
 
 mod detail;
+mod fine_texture;
 mod outline;
 mod wrinkles;
 
@@ -164,9 +165,9 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
     let nucleus = [0, 1].map(|axis| plan.centre[axis] + body.nucleus.off_centre[axis] * body.radius_um / pixel_um);
     let mut canvas = vec![0.0; absorbance.values.len() + wrinkles::LANES];
     wrinkles::add(&mut absorbance, &coverage, &plan.outline, cell, &mut canvas);
-    detail::add_endoplasm(&mut absorbance, &plan.outline, nucleus, cell);
+    let inner = detail::add_endoplasm(&mut absorbance, &plan.outline, nucleus, cell);
     detail::add_halo(&mut absorbance, nucleus, cell);
-    detail::add_detail(&mut absorbance, &coverage, cell, &mut rng);
+    detail::add_detail(&mut absorbance, &coverage, inner, cell, &mut rng)?;
     let lines = &mut canvas[..coverage.values.len()];
     detail::add_cytoskeleton(&mut absorbance, &plan.outline, cell, lines, &mut rng)?;
     detail::add_granules(&mut absorbance, &coverage, body.detail.granules, pixel_um, &mut rng);

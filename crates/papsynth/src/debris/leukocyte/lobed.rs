@@ -1,0 +1,361 @@
+//! Neutrophils and histiocytes: a nucleus of overlapping lobes in a pale, irregular cytoplasm.
+//!
+//! At the resolution of these images, the lobes of most neutrophils overlap and blur into one dark, irregular body.
+
+use core::f64::consts::{PI, TAU};
+
+use super::{Leukocyte, NucleusForm};
+use crate::debris::prelude::*;
+use crate::debris::tuft::{Tuft, crop};
+
+/// Corners of the cytoplasm outline before smoothing.
+const CORNERS: usize = 16;
+/// Curve points per corner.
+const POINTS_PER_CORNER: usize = 3;
+
+/// Relative standard deviation of the radius of the corners of an intact cytoplasm.
+const RAGGED: f64 = 0.05;
+/// The same for a frayed cytoplasm.
+const FRAYED: f64 = 0.1;
+
+/// Probability of a tail.
+const TAIL_PROBABILITY: f64 = 0.45;
+/// Length of a tail relative to the radius: minimum, maximum.
+const TAIL: [f64; 2] = [0.15, 0.65];
+
+/// Lobes of the nucleus of a histiocyte: a bean is a curved row of overlapping discs.
+const BEAN_LOBES: usize = 4;
+
+/// Arrangement of a row of lobes.
+struct Row {
+    /// Distance of neighbouring lobes, in radii of a lobe: minimum, maximum.
+    step: [f64; 2],
+    /// Change of direction of the row at each lobe, radians: minimum, maximum.
+    turn: [f64; 2],
+    /// Radius of a lobe relative to their mean: minimum, maximum.
+    size: [f64; 2],
+}
+
+/// The row of a neutrophil.
+const NEUTROPHIL: Row = Row { step: [0.65, 1.2], turn: [0.6, 2.1], size: [0.8, 1.15] };
+/// The row of a histiocyte.
+const HISTIOCYTE: Row = Row { step: [0.55, 0.7], turn: [0.3, 0.7], size: [0.92, 1.0] };
+
+/// Half-width of the bridge between two lobes, in radii of a lobe.
+const BRIDGE: f64 = 0.5;
+
+/// Absorbance at the rim of a nucleus relative to its centre. Leukocytes are nearly spherical on these slides, so that
+/// their edges are softer than those of the flat nuclei of epithelial cells.
+const RIM: f64 = 0.15;
+/// The same for a smudged nucleus.
+const SMUDGED_RIM: f64 = 0.1;
+
+/// Contrast of the chromatin of an intact nucleus: minimum, maximum.
+const CHROMATIN: [f64; 2] = [0.05, 0.18];
+/// Contrast of the chromatin of a smudged nucleus.
+const SMUDGED: f64 = 0.2;
+/// Contrast of the chromatin of a pyknotic nucleus.
+const PYKNOTIC: f64 = 0.03;
+/// Contrast of the vacuoles of a cytoplasm: minimum, maximum.
+const VACUOLES: [f64; 2] = [0.1, 0.45];
+/// Contrast of the vacuoles of a histiocyte.
+const FOAM: f64 = 0.5;
+
+/// Size (standard deviation) of clumps of chromatin, µm.
+const CLUMP_UM: f64 = 0.45;
+/// Size (standard deviation) of vacuoles, µm: minimum, maximum.
+const VACUOLE_UM: [f64; 2] = [0.25, 0.45];
+
+/// Width of the darker border of a cytoplasm, µm.
+const BORDER_UM: f64 = 0.5;
+/// Relative increase of absorbance in the border: minimum, maximum.
+const BORDER: [f64; 2] = [0.0, 0.4];
+/// Absorbance at the edge of a rounded cytoplasm relative to its centre: minimum, maximum.
+const FLATNESS: [f64; 2] = [0.1, 0.8];
+
+pub(super) fn make(leukocyte: &Leukocyte, context: &ObjectContext<'_>) -> Phantom {
+    let mut rng = context.stream("shape");
+    let cell_radius = 0.5 * leukocyte.cytoplasm_diameter_um;
+    let tail =
+        if random::chance(TAIL_PROBABILITY, &mut rng) { random::between(TAIL[0], TAIL[1], &mut rng) } else { 0.0 };
+    let toward = random::direction(&mut rng);
+    let body = cytoplasm(leukocyte, cell_radius, tail, toward, &mut rng);
+    let lobes = lobes(leukocyte, cell_radius, &mut rng);
+    // The nucleus is on the side opposite to the tail.
+    let shift = -0.35 * tail * cell_radius + 0.1 * cell_radius * random::normal(&mut rng);
+    let at = [shift * libm::cos(toward), shift * libm::sin(toward)];
+    let outline = context.curve_to_grid(&body);
+    let shapes: Vec<Vec<Point>> = lobes
+        .iter()
+        .map(|lobe| {
+            let shape = perturbed_circle(lobe.radius, leukocyte.alpha, leukocyte.beta, &mut rng);
+            let stretch = |p: &Point| [p[0] * lobe.stretch, p[1] / lobe.stretch];
+            let turned = shape.iter().map(|p| placed(stretch(p), lobe.heading, lobe.centre));
+            turned.map(|p| context.to_grid([p[0] + at[0], p[1] + at[1]])).collect()
+        })
+        .collect();
+    let remains = leukocyte.remains.then(|| Remains::draw(cell_radius, context, &mut rng));
+
+    let corners = remains.iter().flat_map(Remains::points);
+    let points: Vec<Point> = outline.iter().chain(shapes.iter().flatten()).copied().chain(corners).collect();
+    let mut canvas = context.canvas(&points, 0.0);
+    canvas.coverage.cover(&outline);
+    shade_cytoplasm(&mut canvas, &outline, leukocyte, context, &mut rng);
+    if let Some(remains) = &remains {
+        remains.add(&mut canvas, leukocyte.cytoplasm_absorbance, context, &mut rng);
+    }
+    let vacuoles = match leukocyte.form {
+        NucleusForm::Kidney => FOAM,
+        NucleusForm::Lobed | NucleusForm::Round => random::between(VACUOLES[0], VACUOLES[1], &mut rng),
+    };
+    let vacuole_um = random::between(VACUOLE_UM[0], VACUOLE_UM[1], &mut rng);
+    let sampler = FieldSampler::clouds(context.px(vacuole_um), &mut rng);
+    canvas.texture(context.noise_fields.clouds(), &sampler, vacuoles as f32);
+
+    let mut nucleus = canvas.blank();
+    for shape in &shapes {
+        nucleus.coverage.cover(shape);
+    }
+    for pair in lobes.windows(2) {
+        let ends = [0, 1].map(|i| context.to_grid([pair[i].centre[0] + at[0], pair[i].centre[1] + at[1]]));
+        let half_width = context.px(BRIDGE * pair[0].radius.min(pair[1].radius));
+        nucleus.stroke(&Stroke::even(ends[0], ends[1], half_width), 0.0);
+    }
+    domed(&mut nucleus, &shapes, leukocyte);
+    let chromatin = match (leukocyte.pyknotic, leukocyte.degenerated) {
+        (true, _) => PYKNOTIC,
+        (false, true) => SMUDGED,
+        (false, false) => random::between(CHROMATIN[0], CHROMATIN[1], &mut rng),
+    };
+    let sampler = FieldSampler::clouds(context.px(CLUMP_UM), &mut rng);
+    nucleus.texture(context.noise_fields.clouds(), &sampler, chromatin as f32);
+    for (cover, inside) in canvas.coverage.values.iter_mut().zip(&nucleus.coverage.values) {
+        *cover = cover.max(*inside);
+    }
+    crop(&mut canvas, context, context.px(leukocyte.reach_um(context.pixel_um)));
+    let mut phantom = canvas
+        .into_phantom(leukocyte.dyes, 0.0, leukocyte.cytoplasm_absorbance)
+        .with_inclusion(nucleus.absorbance, context.dyes.nucleus);
+    let traits = [
+        (leukocyte.pyknotic, Trait::Pyknotic),
+        (leukocyte.degenerated, Trait::Degenerated),
+        (leukocyte.form == NucleusForm::Kidney, Trait::Histiocyte),
+    ];
+    phantom.traits.extend(traits.into_iter().filter(|(present, _)| *present).map(|(_, name)| name));
+    phantom
+}
+
+/// Draws the outline of the cytoplasm, µm from its centre.
+fn cytoplasm(leukocyte: &Leukocyte, radius: f64, tail: f64, toward: f64, rng: &mut Stream) -> Vec<Point> {
+    let ragged = if leukocyte.degenerated { FRAYED } else { RAGGED };
+    let squeeze = random::between(0.82, 1.0, rng);
+    let corners: Vec<Point> = (0..CORNERS)
+        .map(|i| {
+            let angle = TAU * (i as f64 + 0.4 * random::uniform(rng)) / CORNERS as f64;
+            let along = libm::cos(angle - toward).max(0.0);
+            let reach = radius * (1.0 - 0.3 * tail) * (1.0 + ragged * random::normal(rng)).max(0.5);
+            let reach = reach * (1.0 + 1.6 * tail * along * along * along);
+            [reach * libm::cos(angle), squeeze * reach * libm::sin(angle)]
+        })
+        .collect();
+    smooth(&corners, POINTS_PER_CORNER)
+}
+
+/// A lobe of a nucleus, µm.
+struct Lobe {
+    centre: Point,
+    radius: f64,
+    /// Direction of the row of lobes, radians.
+    heading: f64,
+    /// Elongation along this direction.
+    stretch: f64,
+}
+
+/// Draws a bent row of lobes about the centre of the nucleus.
+fn lobes(leukocyte: &Leukocyte, cell_radius: f64, rng: &mut Stream) -> Vec<Lobe> {
+    let (row, count) = match leukocyte.form {
+        NucleusForm::Kidney => (HISTIOCYTE, BEAN_LOBES),
+        NucleusForm::Lobed | NucleusForm::Round => (NEUTROPHIL, leukocyte.lobes),
+    };
+    // The union of the lobes has the area of a disc of the specified radius.
+    let free = uncovered(0.5 * (row.step[0] + row.step[1]));
+    let radius = leukocyte.radius_um / (1.0 + (count - 1) as f64 * free).sqrt();
+    let bend = random::between(row.turn[0], row.turn[1], rng) * if random::chance(0.5, rng) { 1.0 } else { -1.0 };
+    let stretches = match (leukocyte.pyknotic, count) {
+        (true, _) => [1.0, 1.05],
+        (false, 1) => [1.05, 1.35],
+        (false, _) => [1.0, 1.15],
+    };
+    let mut heading = random::direction(rng);
+    let mut at = [0.0, 0.0];
+    let mut lobes: Vec<Lobe> = (0..count)
+        .map(|_| {
+            let own = radius * if count > 1 { random::between(row.size[0], row.size[1], rng) } else { 1.0 };
+            let stretch = random::between(stretches[0], stretches[1], rng);
+            let lobe = Lobe { centre: at, radius: own, heading, stretch };
+            let step = own * random::between(row.step[0], row.step[1], rng);
+            at = [at[0] + step * libm::cos(heading), at[1] + step * libm::sin(heading)];
+            heading += bend * random::between(0.6, 1.3, rng);
+            lobe
+        })
+        .collect();
+    let middle = lobes.iter().fold([0.0; 2], |m, l| [m[0] + l.centre[0], m[1] + l.centre[1]]).map(|v| v / count as f64);
+    for lobe in &mut lobes {
+        lobe.centre = [lobe.centre[0] - middle[0], lobe.centre[1] - middle[1]];
+    }
+    // Shrinks the row to fit inside the cell.
+    let reach = |l: &Lobe| (l.centre[0] * l.centre[0] + l.centre[1] * l.centre[1]).sqrt() + l.radius;
+    let widest = lobes.iter().map(reach).fold(0.0, f64::max);
+    let shrink = (cell_radius / widest).min(1.0);
+    for lobe in &mut lobes {
+        lobe.centre = lobe.centre.map(|v| v * shrink);
+        lobe.radius *= shrink;
+    }
+    lobes
+}
+
+/// Returns the fraction of a disc that another disc of the same radius, `step` radii away, does not cover.
+fn uncovered(step: f64) -> f64 {
+    let half = (0.5 * step).min(1.0);
+    1.0 - 2.0 / PI * (libm::acos(half) - half * (1.0 - half * half).sqrt())
+}
+
+/// Sets the absorbance of the cytoplasm: thicker in the middle, often with a darker border.
+fn shade_cytoplasm(
+    canvas: &mut ObjectCanvas,
+    outline: &[Point],
+    leukocyte: &Leukocyte,
+    context: &ObjectContext<'_>,
+    rng: &mut Stream,
+) {
+    let (middle, square) = (fsd_shape::centroid(outline), area(outline) / PI);
+    let shrink = (1.0 - context.px(BORDER_UM) / square.sqrt()).max(0.0);
+    let inner: Vec<Point> = outline
+        .iter()
+        .map(|p| [middle[0] + shrink * (p[0] - middle[0]), middle[1] + shrink * (p[1] - middle[1])])
+        .collect();
+    let mut inside = canvas.coverage.blank();
+    inside.cover(&inner);
+    let flatness = random::between(FLATNESS[0], FLATNESS[1], rng);
+    let border = random::between(BORDER[0], BORDER[1], rng) as f32;
+    canvas.shade(|p| {
+        let (dx, dy) = (p[0] - middle[0], p[1] - middle[1]);
+        let chord = (1.0 - (dx * dx + dy * dy) / square).max(0.0).sqrt();
+        leukocyte.cytoplasm_absorbance * (flatness + (1.0 - flatness) * chord)
+    });
+    let values = canvas.absorbance.values.iter_mut().zip(&canvas.coverage.values).zip(&inside.values);
+    for ((value, cover), inside) in values {
+        *value *= 1.0 + border * (cover - inside).max(0.0);
+    }
+}
+
+/// Granular remains and shreds of mucus that stick to a leukocyte.
+struct Remains {
+    tuft: Tuft,
+    /// Curved shreds, in grid points, with their half-widths.
+    shreds: Vec<(Vec<Point>, f64)>,
+}
+
+/// Distance of the centre of a tuft from the centre of the cell, in radii of the cell: minimum, maximum.
+const TUFT_DISTANCE: [f64; 2] = [0.5, 1.1];
+/// Half length of a tuft in radii of the cell: minimum, maximum.
+const TUFT_LENGTH: [f64; 2] = [0.45, 1.0];
+/// Width of a tuft relative to its length: minimum, maximum.
+const TUFT_WIDTH: [f64; 2] = [0.5, 1.0];
+/// Grain size of a tuft, µm: minimum, maximum.
+const TUFT_GRAIN_UM: [f64; 2] = [0.6, 1.1];
+/// Contrast of the grains of a tuft.
+const TUFT_GRANULARITY: f64 = 0.35;
+/// Irregularity of the outline of a tuft.
+const TUFT_RAGGED: f64 = 1.2;
+/// Absorbance of a tuft: minimum, maximum.
+const TUFT_ABSORBANCE: [f64; 2] = [0.06, 0.24];
+/// Most shreds.
+const MAX_SHREDS: usize = 4;
+/// Length of a shred in radii of the cell: minimum, maximum.
+const SHRED_LENGTH: [f64; 2] = [0.4, 1.3];
+/// Half-width of a shred, µm: minimum, maximum.
+const SHRED_UM: [f64; 2] = [0.25, 0.8];
+/// Absorbance of a shred added to that of the cytoplasm.
+const SHRED_ABSORBANCE: f64 = 0.05;
+/// Straight segments of a shred.
+const SHRED_PARTS: usize = 4;
+/// Standard deviation of the change of direction per segment, radians.
+const SHRED_BEND: f64 = 0.35;
+
+impl Remains {
+    /// Draws remains on one side of a cell of this radius, µm.
+    fn draw(radius: f64, context: &ObjectContext<'_>, rng: &mut Stream) -> Self {
+        let side = random::direction(rng);
+        let distance = radius * random::between(TUFT_DISTANCE[0], TUFT_DISTANCE[1], rng);
+        let length = radius * random::between(TUFT_LENGTH[0], TUFT_LENGTH[1], rng);
+        let width = length * random::between(TUFT_WIDTH[0], TUFT_WIDTH[1], rng);
+        let tuft = Tuft {
+            centre: context.to_grid([distance * libm::cos(side), distance * libm::sin(side)]),
+            half: [context.px(length), context.px(width)],
+            turn: random::direction(rng),
+            grain: context.px(random::between(TUFT_GRAIN_UM[0], TUFT_GRAIN_UM[1], rng)),
+            granularity: TUFT_GRANULARITY,
+            ragged: TUFT_RAGGED,
+            absorbance: random::between(TUFT_ABSORBANCE[0], TUFT_ABSORBANCE[1], rng),
+        };
+        let shreds = (0..1 + random::below(MAX_SHREDS, rng))
+            .map(|_| {
+                let mut way = side + 0.8 * random::normal(rng);
+                let mut at = [0.8 * radius * libm::cos(way), 0.8 * radius * libm::sin(way)];
+                let step = radius * random::between(SHRED_LENGTH[0], SHRED_LENGTH[1], rng) / SHRED_PARTS as f64;
+                let points = (0..=SHRED_PARTS).map(|_| {
+                    let point = context.to_grid(at);
+                    way += SHRED_BEND * random::normal(rng);
+                    at = [at[0] + step * libm::cos(way), at[1] + step * libm::sin(way)];
+                    point
+                });
+                (points.collect(), context.px(random::between(SHRED_UM[0], SHRED_UM[1], rng)))
+            })
+            .collect();
+        Self { tuft, shreds }
+    }
+
+    /// Returns points whose bounding box contains the remains.
+    fn points(&self) -> impl Iterator<Item = Point> {
+        let ends = self.shreds.iter().flat_map(|(points, half_width)| {
+            points.iter().flat_map(move |p| [-half_width, *half_width].map(|by| [p[0] + by, p[1] + by]))
+        });
+        self.tuft.corners().into_iter().chain(ends)
+    }
+
+    /// Adds the remains to a cell.
+    fn add(&self, canvas: &mut ObjectCanvas, absorbance: f64, context: &ObjectContext<'_>, rng: &mut Stream) {
+        let mut tuft = canvas.blank();
+        self.tuft.draw(&mut tuft, context, rng);
+        let values = canvas.absorbance.values.iter_mut().zip(&tuft.absorbance.values);
+        values.for_each(|(value, added)| *value += added);
+        let covers = canvas.coverage.values.iter_mut().zip(&tuft.coverage.values);
+        covers.for_each(|(cover, other)| *cover = cover.max(*other));
+        let strength = 0.5 * absorbance + SHRED_ABSORBANCE;
+        for (points, half_width) in &self.shreds {
+            for (i, pair) in points.windows(2).enumerate() {
+                // Shreds taper to a point.
+                let half_widths = [i, i + 1].map(|i| half_width * (1.0 - 0.8 * i as f64 / SHRED_PARTS as f64));
+                canvas.stroke_max(&Stroke { ends: [pair[0], pair[1]], half_widths }, strength);
+            }
+        }
+    }
+}
+
+/// Sets the absorbance of a nucleus from the summed thickness of its lobes.
+fn domed(nucleus: &mut ObjectCanvas, shapes: &[Vec<Point>], leukocyte: &Leukocyte) {
+    /// Upper limit of the thickness of overlapping lobes.
+    const MAX_THICKNESS: f64 = 1.3;
+    let smudged = leukocyte.degenerated && !leukocyte.pyknotic;
+    let rim = if smudged { SMUDGED_RIM } else { RIM };
+    let spheres: Vec<(Point, f64)> = shapes.iter().map(|lobe| (fsd_shape::centroid(lobe), area(lobe) / PI)).collect();
+    nucleus.shade(|p| {
+        let chord = |(centre, square): &(Point, f64)| {
+            let (dx, dy) = (p[0] - centre[0], p[1] - centre[1]);
+            (1.0 - (dx * dx + dy * dy) / square).max(0.0).sqrt()
+        };
+        let thickness = spheres.iter().map(chord).sum::<f64>().min(MAX_THICKNESS);
+        leukocyte.absorbance * (rim + (1.0 - rim) * 1.2 * thickness)
+    });
+}

@@ -1,0 +1,64 @@
+//! The fine texture of cytoplasm: grains, networks and fibres.
+
+use std::ops::Range;
+
+use multiversion::multiversion;
+
+use super::detail::CoarseTile;
+use crate::error::ErrorKind;
+use crate::phantom::cell_context::CellContext;
+use crate::phantom::texture_pool::{Pool, PoolSampler};
+
+/// The fine texture of a cell: one kind in the ectoplasm, another in the endoplasm.
+pub(super) struct FineTexture<'a> {
+    /// Pool and place of both kinds.
+    kinds: [(&'a Pool, PoolSampler); 2],
+    inner: Option<CoarseTile>,
+    /// Fraction of the inner kind in a row, and its values.
+    rows: [Vec<f32>; 2],
+    strength: f32,
+}
+
+impl<'a> FineTexture<'a> {
+    /// Returns none for a cell without texture.
+    pub(super) fn new(cell: &CellContext<'a>, inner: Option<CoarseTile>) -> Result<Option<Self>, ErrorKind> {
+        let (pools, pixel_um, mut rng) = (&cell.assets.textures, cell.pixel_um(), cell.stream("texture.place"));
+        // A pixel shows the mean of the texture.
+        let strength = cell.body.detail.texture * (pools.texel_um() / pixel_um).min(1.0);
+        if strength <= 0.0 {
+            return Ok(None);
+        }
+        let mut kind = |name| pools.pool(name).map(|pool| (pool, pools.sampler(pixel_um, &mut rng)));
+        let [outer, inner_kind] = &cell.body.textures;
+        let kinds = [kind(outer)?, kind(inner_kind)?];
+        Ok(Some(Self { kinds, inner, rows: Default::default(), strength: strength as f32 }))
+    }
+
+    /// Writes columns of row `y` of the tile.
+    pub(super) fn row_into(&mut self, row: &mut [f32], columns: Range<usize>, y: usize) {
+        let at = [columns.start as f64, y as f64];
+        let [(outer, place), (inner, inner_place)] = &self.kinds;
+        outer.row_into(&mut row[columns.clone()], place, at);
+        let fractions = self.inner.as_mut().map(|zone| {
+            let [fractions, values] = &mut self.rows;
+            fractions.resize(row.len(), 0.0);
+            values.resize(row.len(), 0.0);
+            zone.row_into(fractions, y);
+            inner.row_into(&mut values[columns.clone()], inner_place, at);
+            (&fractions[columns.clone()], &values[columns.clone()])
+        });
+        match fractions {
+            Some((fractions, values)) => mix_textures(&mut row[columns], values, fractions, self.strength),
+            None => row[columns].iter_mut().for_each(|value| *value *= self.strength),
+        }
+    }
+}
+
+/// Mixes two textures so that the variance of independent ones stays the same, and multiplies by `strength`.
+#[multiversion(targets = "simd")]
+fn mix_textures(outer: &mut [f32], inner: &[f32], fractions: &[f32], strength: f32) {
+    for ((outer, inner), part) in outer.iter_mut().zip(inner).zip(fractions) {
+        let rest = 1.0 - part;
+        *outer = strength * (rest * *outer + part * inner) / (rest * rest + part * part).sqrt();
+    }
+}
