@@ -307,7 +307,7 @@ fn summary(name: &str, kind: usize, windows: &[Window]) -> Result<Option<Texture
     if own.is_empty() {
         return Ok(None);
     }
-    // Windows count equally, whatever their strength.
+    // Windows count equally, strong and weak ones.
     let weighted: Vec<(&Statistics, f64)> =
         own.iter().map(|w| (&w.statistics, 1.0 / w.statistics.pixels.variance.max(1e-12))).collect();
     let statistics = Statistics::mean(&weighted).map_err(ErrorKind::CytoplasmTexture)?.rounded(TEXTURE_DIGITS);
