@@ -158,6 +158,7 @@ fn cytoplasm(folder: &Path, pixel_um: f64) -> Result<Vec<CytoplasmImage>, ExitEr
             absorbance: found.absorbance,
             mean: found.mean,
             mask: found.mask,
+            empty: found.empty,
             noise: found.noise,
             blur_px: found.blur_px,
         })

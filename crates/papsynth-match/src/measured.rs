@@ -1,5 +1,6 @@
 //! Parameters that statistics of real fields measure directly: light, noise, bits.
 
+use papsynth::clipped_noise;
 use papsynth_judge::{Control, Detail, FieldImage, NucleiFrom, Phase};
 use rayon::prelude::*;
 
@@ -79,6 +80,8 @@ struct Light {
     level: f64,
     across: f64,
     down: f64,
+    /// Mean grey level of the empty slide below the highest one, of 255.
+    below: f64,
     coverage: f64,
     empty: Empty,
 }
@@ -164,8 +167,11 @@ pub(crate) fn measure_in(fields: &[FieldImage], pixel_um: f64, phase: &Phase) ->
             put(parameter, values, CORRELATION_ERROR + ADDED_CORRELATION * added + 0.25 * (high - low));
         }
     }
-    let noise: Vec<f64> =
-        column(&|l| l.empty.deviation * LEVELS / scale).into_iter().map(|n| libm::log(n.max(1e-3))).collect();
+    let noise_of = |l: &Light| {
+        let measured = l.empty.deviation * LEVELS / scale;
+        if extended { before_clipping(measured, l.below) } else { measured }
+    };
+    let noise: Vec<f64> = column(&noise_of).into_iter().map(|n| libm::log(n.max(1e-3))).collect();
     if !noise.is_empty() {
         let half = of_mean(deviation(&noise), noise.len()) + NOISE_ERROR + added;
         let prior = Parameter::Noise.prior();
@@ -185,7 +191,7 @@ pub(crate) fn measure_in(fields: &[FieldImage], pixel_um: f64, phase: &Phase) ->
                 (Parameter::Level, l.level),
                 (Parameter::FalloffX, l.across.max(0.0)),
                 (Parameter::FalloffY, l.down.max(0.0)),
-                (Parameter::Noise, l.empty.deviation * LEVELS / scale),
+                (Parameter::Noise, noise_of(l)),
             ]
         })
         .collect();
@@ -223,9 +229,29 @@ fn light(field: &FieldImage, view: &Sampler, control: &Control) -> Result<Light,
         level: middle / LEVELS,
         across,
         down,
+        below: LEVELS - s.background_dn,
         coverage: s.coverage,
         empty: Empty::new(&field.grey, field.width, grey),
     })
+}
+
+/// Returns the standard deviation of noise of an EDF image far below the highest grey level, from the standard deviation
+/// measured at `below` grey levels under it.
+fn before_clipping(measured: f64, below: f64) -> f64 {
+    /// Largest factor: clipping at the level itself leaves 0.58 of the standard deviation.
+    const LARGEST: f64 = 2.0;
+    /// Steps of the bisection.
+    const STEPS: usize = 30;
+    let (mut low, mut high) = (measured, LARGEST * measured);
+    for _ in 0..STEPS {
+        let middle = 0.5 * (low + high);
+        if clipped_noise(middle, below) < measured {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
 }
 
 /// Returns the bits for all grey levels; 8 if grey levels are fractions.
@@ -261,6 +287,17 @@ fn of_mean(sd: f64, count: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn noise_is_restored_where_planes_are_clipped() {
+        for sd in [0.8, 2.6, 5.0] {
+            for below in [0.0, 1.5, 4.0, 20.0, 120.0] {
+                let found = before_clipping(clipped_noise(sd, below), below);
+                assert!((found / sd - 1.0).abs() < 1e-6, "{sd} {below}: {found}");
+            }
+        }
+        assert!(before_clipping(f64::NAN, 10.0).is_nan());
+    }
 
     #[test]
     fn different_sizes_and_an_invalid_pixel_size_are_errors() {

@@ -102,8 +102,15 @@ const HALF_UNCORRELATED: f64 = 15.0;
 const LINES: f32 = 1.5;
 
 /// Noise of a plane relative to that of the fused image: fitted to the decrease of noise just below the highest grey
-/// level.
-const PLANE_NOISE: f64 = 2.0;
+/// level of real EDF images.
+const PLANE_NOISE: f64 = 3.0;
+
+/// Returns the standard deviation of the noise of an EDF image at `below` grey levels under the highest one, where the
+/// planes are clipped before fusion. `sd` is the standard deviation far below it, in grey levels.
+#[must_use]
+pub fn clipped_noise(sd: f64, below: f64) -> f64 {
+    sd * clipped_normal_sd(below.max(0.0) / (PLANE_NOISE * sd).max(1e-6))
+}
 
 /// Number of steps of the table of clipped noise, and its range in standard deviations.
 const STEPS: usize = 64;

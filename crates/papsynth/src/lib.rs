@@ -31,5 +31,6 @@ use portable_numerics::random;
 pub use engine::{Engine, Inputs};
 pub use error::{Error, ErrorKind, NucleusError};
 pub use frame::{Finished, Frame, Plane, white_level};
+pub use fuse::clipped_noise;
 pub use slide::Slide;
 pub use threads::Threads;

@@ -15,6 +15,8 @@ pub struct BareCytoplasm {
     pub width: usize,
     /// 1 in these areas, 0 elsewhere.
     pub mask: Vec<f32>,
+    /// 1 on the empty slide far from objects, 0 elsewhere.
+    pub empty: Vec<f32>,
     /// Standard deviation of the noise of the empty slide, absorbance; NaN if unknown.
     pub noise: f64,
     /// Median blur of edges, standard deviation in pixels; NaN if unknown.
@@ -31,11 +33,17 @@ const MEAN_UM: f64 = 2.7;
 const EDGE_UM: f64 = 1.0;
 
 /// Largest slope of the smoothed absorbance over the local mean, µm⁻¹: borders of cells and folds are steeper.
-const STEEP: f32 = 0.136;
+const STEEP: f32 = 0.18;
 
 /// Largest deviation of the smoothed absorbance from the local mean, as a fraction of it: wrinkles and debris deviate
 /// more.
-const DEVIATION: f32 = 0.3;
+const DEVIATION: f32 = 0.4;
+
+/// Largest absorbance of the empty slide after smoothing.
+const EMPTY: f32 = 0.012;
+
+/// Distance of the empty slide from objects, µm.
+const EMPTY_UM: f64 = 4.0;
 
 /// Distance from borders of cells, from nuclei and from steep areas, µm.
 const DISTANCES_UM: [f64; 3] = [2.0, 3.0, 1.6];
@@ -62,13 +70,16 @@ impl BareCytoplasm {
                 *kept = if near { 0.0 } else { *kept };
             }
         }
+        let objects: Vec<bool> = maps.smoother.iter().map(|a| a.abs() > EMPTY).collect();
+        let near = dilated(&objects, width, whole(px(EMPTY_UM)));
+        let empty = near.into_iter().map(|near| if near { 0.0 } else { 1.0 }).collect();
         // Grey levels of 255 to absorbance at the light of the empty slide.
         let level = 255.0 * maps.background.mean();
         let noise = noise_dn / (level.max(1.0) * std::f64::consts::LN_10);
         let inside = |values: &[f32]| blur(values, width, px(MEAN_UM));
         let weighted: Vec<f32> = maps.absorbance.iter().zip(&mask).map(|(a, m)| a * m).collect();
         let mean = inside(&weighted).iter().zip(inside(&mask)).map(|(sum, weight)| sum / weight.max(1e-6)).collect();
-        Self { absorbance: maps.absorbance, mean, width, mask, noise, blur_px }
+        Self { absorbance: maps.absorbance, mean, width, mask, empty, noise, blur_px }
     }
 }
 
@@ -116,11 +127,13 @@ mod tests {
         let mut area = 0.0;
         for (i, kept) in found.mask.iter().enumerate() {
             let (x, y) = ((i % 220) as f64, (i / 220) as f64);
+            assert!(found.empty[i] == 0.0 || libm::hypot(x - 100.0, y - 100.0) > 83.0, "{x} {y}");
             assert!(*kept == 0.0 || (inside(x, y) && !nucleus(x, y) && !fold(x)), "{x} {y}");
             assert!(*kept == 0.0 || (found.mean[i] - 0.15).abs() < 0.01, "{x} {y}: {}", found.mean[i]);
             area += kept;
         }
         assert!(area > 0.4 * 20_000.0, "{area}");
+        assert!(found.empty.iter().sum::<f32>() > 10_000.0);
     }
 
     #[test]

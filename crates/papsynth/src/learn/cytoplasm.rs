@@ -1,6 +1,7 @@
 //! Learns the texture of cytoplasm from areas of fields that show cytoplasm alone.
 
 use portable_numerics::random::Ziggurat;
+use portable_numerics::statistics::quantile;
 use steerable_texture::{Analyzer, Statistics, TextureParams};
 
 use super::rounded;
@@ -21,6 +22,8 @@ pub struct CytoplasmImage {
     pub mean: Vec<f32>,
     /// 1 in these areas, 0 elsewhere.
     pub mask: Vec<f32>,
+    /// 1 on the empty slide, 0 elsewhere.
+    pub empty: Vec<f32>,
     /// Standard deviation of the noise of the empty slide, absorbance.
     pub noise: f64,
     /// Median blur of edges, standard deviation in pixels.
@@ -67,7 +70,12 @@ struct Window {
     /// Variances of the octaves without noise and blur: high-pass residual, scales, low-pass residual.
     octaves: Vec<f64>,
     kind: usize,
+    /// Weight in means: fields count equally, except those with few windows.
+    weight: f64,
 }
+
+/// Windows of a field that counts fully.
+const WHOLE_FIELD: usize = 10;
 
 /// The test of a kind of texture.
 type Test = fn(&Features) -> bool;
@@ -107,16 +115,21 @@ fn learned(base: &Model, images: &[CytoplasmImage], params: &CytoplasmParams) ->
     }
     let texture = TextureParams::default();
     let analyzer = Analyzer::new(FRAME, FRAME, &texture).map_err(ErrorKind::CytoplasmTexture)?;
-    let white = white_octaves(&texture)?;
-    let mut windows = Vec::new();
-    for (index, image) in images.iter().enumerate() {
+    for image in images {
         let pixels = image.absorbance.len();
-        if image.width == 0 || pixels % image.width != 0 || [image.mean.len(), image.mask.len()] != [pixels; 2] {
+        let others = [image.mean.len(), image.mask.len(), image.empty.len()];
+        if image.width == 0 || pixels % image.width != 0 || others != [pixels; 3] {
             return Err(ErrorKind::CytoplasmSize(image.name.clone()));
         }
+    }
+    let noise = Noise::measure(images, &analyzer, &texture)?;
+    let mut windows = Vec::new();
+    for (index, image) in images.iter().enumerate() {
         let relative = image.relative();
-        for place in image.places() {
-            windows.push(Window::new(index, image, &relative, place, &analyzer, &white)?);
+        let places = image.places(&image.mask);
+        let weight = 1.0 / places.len().max(WHOLE_FIELD) as f64;
+        for place in places {
+            windows.push(Window { weight, ..Window::new(index, image, &relative, place, &analyzer, &noise)? });
         }
     }
     if windows.len() < MIN_WINDOWS {
@@ -134,8 +147,9 @@ fn learned(base: &Model, images: &[CytoplasmImage], params: &CytoplasmParams) ->
     });
     let kinds = KINDS.iter().enumerate().filter_map(|(kind, (name, _))| summary(name, kind, &windows).transpose());
     let kinds = kinds.collect::<Result<Vec<TextureKind>, ErrorKind>>()?;
+    let field_log_sd = between_fields(&windows);
     model.cytoplasm_texture =
-        Some(CytoplasmTexture { pixel_um: params.pixel_um, field_log_sd: between_fields(&windows), kinds });
+        Some(CytoplasmTexture { pixel_um: params.pixel_um, field_log_sd, field_kind: field_kind(&windows), kinds });
     model.checked()?;
     Ok(model)
 }
@@ -150,12 +164,12 @@ impl CytoplasmImage {
         (0..self.absorbance.len()).map(of).collect()
     }
 
-    /// Returns the top left corners of the windows.
-    fn places(&self) -> Vec<[usize; 2]> {
+    /// Returns the top left corners of the windows of a mask.
+    fn places(&self, mask: &[f32]) -> Vec<[usize; 2]> {
         let height = self.absorbance.len() / self.width;
         let starts = |length: usize| (0..(length + 1).saturating_sub(WINDOW)).step_by(WINDOW / 2);
         let covered = |[left, top]: &[usize; 2]| {
-            let rows = (*top..top + WINDOW).map(|y| &self.mask[y * self.width + left..][..WINDOW]);
+            let rows = (*top..top + WINDOW).map(|y| &mask[y * self.width + left..][..WINDOW]);
             let sum: f64 = rows.flatten().map(|m| f64::from(*m)).sum();
             sum >= COVERED * (WINDOW * WINDOW) as f64
         };
@@ -165,7 +179,7 @@ impl CytoplasmImage {
 
     /// Returns the interpolated relative deviation and mask around the centre of a window, rotated by an angle. The
     /// mask is 0 outside the window.
-    fn frame(&self, relative: &[f32], [left, top]: [usize; 2], direction: f64) -> [Vec<f32>; 2] {
+    fn frame(&self, relative: &[f32], mask: &[f32], [left, top]: [usize; 2], direction: f64) -> [Vec<f32>; 2] {
         let height = self.absorbance.len() / self.width;
         let (sin, cos) = (libm::sin(direction), libm::cos(direction));
         let centre = [left, top].map(|corner| (corner + WINDOW / 2) as f64 - 0.5);
@@ -188,7 +202,7 @@ impl CytoplasmImage {
             ] {
                 let Some(p) = at(x.floor() + dx, y.floor() + dy) else { continue };
                 *value += (share * f64::from(relative[p])) as f32;
-                *weight += if inside { (share * f64::from(self.mask[p])) as f32 } else { 0.0 };
+                *weight += if inside { (share * f64::from(mask[p])) as f32 } else { 0.0 };
                 *weight = weight.min(1.0);
             }
         }
@@ -203,21 +217,21 @@ impl Window {
         relative: &[f32],
         place: [usize; 2],
         analyzer: &Analyzer,
-        white: &[f64],
+        noise: &Noise,
     ) -> Result<Self, ErrorKind> {
         let measure = |direction: f64| {
-            let [values, weights] = image.frame(relative, place, direction);
+            let [values, weights] = image.frame(relative, &image.mask, place, direction);
             analyzer.measure(&values, Some(&weights)).map_err(ErrorKind::CytoplasmTexture)
         };
         let mut statistics = measure(0.0)?;
         let features = Features::new(&statistics);
         let kind = KINDS.iter().position(|(_, matches)| matches(&features)).unwrap_or(KINDS.len() - 1);
-        let noise = image.noise_of(place);
-        let octaves = object_octaves(&statistics, noise, image.blur_px, white);
+        let variance = image.noise_of(place, noise.of(image));
+        let octaves = object_octaves(&statistics, variance, image.blur_px, &noise.octaves);
         if kind == FIBRILLAR {
             statistics = measure(features.direction)?;
         }
-        Ok(Self { image: index, statistics, octaves, kind })
+        Ok(Self { image: index, statistics, octaves, kind, weight: 1.0 })
     }
 
     /// Returns the standard deviation of the texture.
@@ -228,16 +242,14 @@ impl Window {
 
 impl CytoplasmImage {
     /// Returns the variance of the noise in a window, relative to its mean absorbance.
-    fn noise_of(&self, [left, top]: [usize; 2]) -> f64 {
-        if !self.noise.is_finite() {
-            return 0.0;
-        }
+    /// `noise` is the standard deviation on the empty slide.
+    fn noise_of(&self, [left, top]: [usize; 2], noise: f64) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
         for y in top..top + WINDOW {
             for i in y * self.width + left..y * self.width + left + WINDOW {
                 let (mask, mean) = (f64::from(self.mask[i]), f64::from(self.mean[i].max(MIN_MEAN)));
                 // Photon noise: the variance of the absorbance is inversely proportional to the light.
-                sum += mask * libm::exp10(mean) * (self.noise / mean) * (self.noise / mean);
+                sum += mask * libm::exp10(mean) * (noise / mean) * (noise / mean);
                 count += mask;
             }
         }
@@ -275,6 +287,47 @@ fn octaves(statistics: &Statistics) -> Vec<f64> {
     [statistics.high_pass_variance].into_iter().chain(scales).chain([residual]).collect()
 }
 
+/// Noise of the camera.
+struct Noise {
+    /// Octaves of the variance, relative to the variance.
+    octaves: Vec<f64>,
+    /// Median of the standard deviations of the images, absorbance.
+    typical: f64,
+}
+
+impl Noise {
+    /// Measures the octaves on the empty slide; without empty slide, they are those of white noise.
+    fn measure(images: &[CytoplasmImage], analyzer: &Analyzer, texture: &TextureParams) -> Result<Self, ErrorKind> {
+        let mut known: Vec<f64> = images.iter().map(|image| image.noise).filter(|noise| noise.is_finite()).collect();
+        let typical = if known.is_empty() { 0.0 } else { quantile(&mut known, 0.5) };
+        let mut found: Vec<Vec<f64>> = Vec::new();
+        for image in images.iter().filter(|image| image.noise >= typical && image.noise > 0.0) {
+            for place in image.places(&image.empty).into_iter().step_by(STEP_OF_EMPTY) {
+                let [values, weights] = image.frame(&image.absorbance, &image.empty, place, 0.0);
+                let measured = analyzer.measure(&values, Some(&weights)).map_err(ErrorKind::CytoplasmTexture)?;
+                found.push(octaves(&measured).iter().map(|v| v / (image.noise * image.noise)).collect());
+            }
+        }
+        let mut white = white_octaves(texture)?;
+        if found.len() >= MIN_WINDOWS {
+            for (octave, value) in white.iter_mut().enumerate() {
+                // Dirt adds to the coarse octaves of some windows.
+                *value = quantile(&mut found.iter().map(|o| o[octave]).collect::<Vec<_>>(), 0.25);
+            }
+        }
+        Ok(Self { octaves: white, typical })
+    }
+
+    /// Returns the standard deviation of the noise of an image on a slide without saturation: where the slide saturates,
+    /// it shows less noise than the cells.
+    fn of(&self, image: &CytoplasmImage) -> f64 {
+        if image.noise.is_finite() { image.noise.max(self.typical) } else { 0.0 }
+    }
+}
+
+/// Every one of this many windows of the empty slide is measured.
+const STEP_OF_EMPTY: usize = 4;
+
 /// Returns the octaves of white noise with variance 1.
 fn white_octaves(texture: &TextureParams) -> Result<Vec<f64>, ErrorKind> {
     const SIDE: usize = 512;
@@ -307,20 +360,20 @@ fn summary(name: &str, kind: usize, windows: &[Window]) -> Result<Option<Texture
     if own.is_empty() {
         return Ok(None);
     }
-    // Windows count equally, strong and weak ones.
+    // Strong and weak textures count equally.
     let weighted: Vec<(&Statistics, f64)> =
-        own.iter().map(|w| (&w.statistics, 1.0 / w.statistics.pixels.variance.max(1e-12))).collect();
+        own.iter().map(|w| (&w.statistics, w.weight / w.statistics.pixels.variance.max(1e-12))).collect();
     let statistics = Statistics::mean(&weighted).map_err(ErrorKind::CytoplasmTexture)?.rounded(TEXTURE_DIGITS);
-    let count = own.len() as f64;
+    let total: f64 = own.iter().map(|w| w.weight).sum();
     let octave = |octave: usize| {
-        let relative = |w: &&Window| w.octaves[octave] / (w.strength() * w.strength()).max(1e-12);
-        rounded((own.iter().map(relative).sum::<f64>() / count).sqrt())
+        let relative = |w: &&Window| w.weight * w.octaves[octave] / (w.strength() * w.strength()).max(1e-12);
+        rounded((own.iter().map(relative).sum::<f64>() / total).sqrt())
     };
-    let logs: Vec<f64> = own.iter().map(|w| libm::log(w.strength().max(1e-6))).collect();
-    let mean = logs.iter().sum::<f64>() / count;
+    let mean = own.iter().map(|w| w.weight * libm::log(w.strength().max(1e-6))).sum::<f64>() / total;
+    let all: f64 = windows.iter().map(|w| w.weight).sum();
     Ok(Some(TextureKind {
         name: name.to_owned(),
-        weight: rounded(count / windows.len() as f64),
+        weight: rounded(total / all),
         strength: LogNormal { median: rounded(libm::exp(mean)), log_sd: rounded(within_fields(&own)) },
         octaves: (0..own[0].octaves.len()).map(octave).collect(),
         statistics,
@@ -355,6 +408,31 @@ fn between_fields(windows: &[Window]) -> f64 {
     rounded(super::normal(means.into_iter()).sd)
 }
 
+/// Returns the probability that a window has the kind of its field: p² = (S − D)/(1 − D), where S and D are the
+/// probabilities that two windows of the same field and of different fields have the same kind.
+fn field_kind(windows: &[Window]) -> f64 {
+    let fields = windows.iter().map(|w| w.image).max().map_or(0, |most| most + 1);
+    let mut counts = vec![[0.0; KINDS.len()]; fields];
+    for window in windows {
+        counts[window.image][window.kind] += 1.0;
+    }
+    counts.retain(|of_kinds| of_kinds.iter().sum::<f64>() >= WHOLE_FIELD as f64);
+    let (mut same, mut different, mut pairs) = (0.0, 0.0, 0.0);
+    for (i, first) in counts.iter().enumerate() {
+        let n = first.iter().sum::<f64>();
+        same += first.iter().map(|count| count * (count - 1.0)).sum::<f64>() / (n * (n - 1.0));
+        for second in &counts[..i] {
+            different += first.iter().zip(second).map(|(a, b)| a * b).sum::<f64>() / (n * second.iter().sum::<f64>());
+            pairs += 1.0;
+        }
+    }
+    if pairs == 0.0 {
+        return 0.0;
+    }
+    let (same, different) = (same / counts.len() as f64, different / pairs);
+    rounded(((same - different) / (1.0 - different).max(1e-9)).clamp(0.0, 1.0).sqrt())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -376,6 +454,7 @@ mod tests {
             absorbance: absorbance.collect(),
             mean: vec![0.2; SIDE * SIDE],
             mask: vec![1.0; SIDE * SIDE],
+            empty: vec![0.0; SIDE * SIDE],
             noise: noise * libm::pow(10.0, -0.1),
             blur_px: 0.0,
         }

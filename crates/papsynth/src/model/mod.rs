@@ -39,6 +39,9 @@ pub struct CytoplasmTexture {
     pub pixel_um: f64,
     /// Standard deviation between fields of the logarithm of the strength.
     pub field_log_sd: f64,
+    /// Probability that a cell has the kind that its field has drawn, instead of a kind of its own.
+    #[serde(default)]
+    pub field_kind: f64,
     /// Kinds of texture.
     pub kinds: Vec<TextureKind>,
 }
@@ -331,6 +334,7 @@ impl CytoplasmTexture {
     fn check(&self, path: &str) -> Result<(), ErrorKind> {
         within(&format!("{path}.pixel_um"), self.pixel_um, [0.05, 2.0])?;
         within(&format!("{path}.field_log_sd"), self.field_log_sd, [0.0, 2.0])?;
+        within(&format!("{path}.field_kind"), self.field_kind, [0.0, 1.0])?;
         if self.kinds.is_empty() {
             return Err(ErrorKind::NoTexture);
         }

@@ -213,7 +213,7 @@ fn draw_body(
         * mix.cytoplasm_stain.draw(rng);
     let mut detail = draw_detail(recipe, cytoplasm.pliability, rng, &own);
     let mut texture_rng = own("texture");
-    let textures = [0, 1].map(|_| drawn_kind(texture, &mut texture_rng));
+    let textures = [0, 1].map(|_| drawn_kind(texture, stain.kind_of_texture, &mut texture_rng));
     let strength = &textures[0].strength;
     detail.texture *= strength.median
         * libm::exp(
@@ -282,9 +282,11 @@ fn draw_body(
     }
 }
 
-/// Draws a kind of texture by its weight.
-fn drawn_kind<'a>(texture: &'a CytoplasmTexture, rng: &mut Stream) -> &'a TextureKind {
-    let mut at = random::uniform(rng) * texture.kinds.iter().map(|kind| kind.weight).sum::<f64>();
+/// Draws a kind of texture by its weight: that of the field, or one of its own.
+fn drawn_kind<'a>(texture: &'a CytoplasmTexture, of_field: f64, rng: &mut Stream) -> &'a TextureKind {
+    let own = random::uniform(rng);
+    let place = if random::chance(texture.field_kind, rng) { of_field } else { own };
+    let mut at = place * texture.kinds.iter().map(|kind| kind.weight).sum::<f64>();
     let found = texture.kinds.iter().find(|kind| {
         at -= kind.weight;
         at < 0.0

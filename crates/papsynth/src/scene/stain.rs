@@ -25,6 +25,8 @@ pub(crate) struct FieldStain<'a> {
     pub(super) texture: f64,
     /// Deviation of the texture of cytoplasm from its mean strength, standard deviations between fields.
     pub(super) cytoplasm_texture: f64,
+    /// The kind of that texture in the field: a position in the list of kinds, weighted, 0 to 1.
+    pub(super) kind_of_texture: f64,
     /// Factors on the standard deviations between the cells of a class: of the absorbance of cytoplasm, and of the
     /// absorbance and texture of nuclei.
     pub(super) cytoplasm_variation: f64,
@@ -60,6 +62,7 @@ impl<'a> FieldStain<'a> {
             nucleus: of_slide(named!("stain", stain.slide_nucleus)) * field.draw(named!("stain", stain.field_nucleus)),
             texture: field.draw(named!("stain", stain.field_texture)),
             cytoplasm_texture: random::normal(&mut field.key.stream("field", 0, "strength of texture")),
+            kind_of_texture: random::uniform(&mut field.key.stream("field", 0, "kind of texture")),
             cytoplasm_variation: field.draw(named!("stain", stain.cytoplasm_variation)),
             nucleus_variation: field.draw(named!("stain", stain.nucleus_variation)),
             balance,

@@ -64,14 +64,22 @@ pub(super) fn add_detail(
 /// pixels. The root mean square error is then a hundredth of the standard deviation of the clouds.
 const SMOOTH_PX: f64 = 3.0 * COARSE as f64;
 
+/// Thickness for which the strength of the texture was measured, relative to the flat sheet.
+const TEXTURE_THICKNESS: f32 = 1.3;
+
 /// Multiplies a row by 1 plus the clouds and the flecks above a threshold, times their strengths, plus the texture.
 /// Negative factors count as 0.
+///
+/// The texture adds up at random over the thickness, so that its relative deviation is inversely proportional to the
+/// root of the thickness: it is strong at thin rims and weak on folds.
 #[multiversion(targets = "simd")]
 fn modulate(row: &mut [f32], [clouds, flecks, texture]: [&[f32]; 3], strengths: [f32; 2], threshold: f32) {
     for (((value, cloud), &fleck), texture) in row.iter_mut().zip(clouds).zip(flecks).zip(texture) {
         let above = if fleck > threshold { fleck - threshold } else { 0.0 };
-        let factor = 1.0 + strengths[0] * cloud + strengths[1] * above + texture;
-        *value *= if factor > 0.0 { factor } else { 0.0 };
+        let thickness = if *value > 0.0 { *value } else { 0.0 };
+        let deviation = texture * (TEXTURE_THICKNESS * thickness).sqrt();
+        let changed = thickness * (1.0 + strengths[0] * cloud + strengths[1] * above) + deviation;
+        *value = if changed > 0.0 { changed } else { 0.0 };
     }
 }
 
