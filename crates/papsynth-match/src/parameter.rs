@@ -93,7 +93,7 @@ parameters! {
     /// Standard deviation of noise of the empty slide, grey levels of 255.
     Noise: Measured, Field, Logarithmic 0.5..6.0 "dn", "camera.full_well_e, camera.read_noise_e: noise of the empty slide";
     /// Fraction of the noise variance that is the same in all images.
-    Pattern: Simulated, All, Linear 0.0..0.8 "", "camera.prnu: part of the variance of noise";
+    Pattern: Simulated, All, Linear 0.0..0.8 "", "camera.prnu, camera.dsnu_e: part of the variance of noise";
     /// Correlation of noise with the next pixel of the row, in fused images.
     NoiseCorrelationX: Measured, All, Linear 0.0..0.45 "", "focus.noise_correlation_x";
     /// Correlation of noise with the next pixel of the column, in fused images.

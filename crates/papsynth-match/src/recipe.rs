@@ -66,7 +66,7 @@ impl Setting {
         let signal = signal(level, glare);
         let per_dn = centre(&camera.full_well_e) * (1.0 - glare) / LEVELS;
         let (photons, read) = (signal / per_dn, centre(&camera.read_noise_e) / per_dn);
-        let pattern = centre(&camera.prnu) * signal;
+        let pattern = libm::hypot(centre(&camera.prnu) * signal, centre(&camera.dsnu_e) / per_dn);
         let noise = photons + read * read + pattern * pattern + ROUNDING;
         let counts: f64 = base.cells.values().map(|mix| density(&mix.count, area)).sum();
         let [superficial, intermediate] = of_pair(base);
@@ -283,6 +283,9 @@ fn camera(r: &mut Recipe, log_sd: f64, on: &impl Fn(P) -> bool, or_base: &impl F
     }
     /// Minimum fraction of photon noise and of read noise.
     const LEAST: f64 = 0.02;
+    /// Fraction of the variance of the pattern that does not depend on the light: fitted to the pattern that real
+    /// fields share on the empty slide and on cells.
+    const ADDITIVE: f64 = 1.0 / 3.0;
     /// Range of the full well in recipes, electrons.
     const WELL: [f64; 2] = [10.0, 1e7];
     let glare = centre(&r.camera.glare_subtracted);
@@ -300,9 +303,9 @@ fn camera(r: &mut Recipe, log_sd: f64, on: &impl Fn(P) -> bool, or_base: &impl F
     let spread = (log_sd / (1.0 - photons)).min(0.5);
     camera.read_noise_e = if spread > 0.02 { log_normal(read, spread) } else { number(read) };
     camera.read_noise_rms_e = 0.0.into();
-    camera.dsnu_e = 0.0.into();
+    camera.dsnu_e = number(per_dn * (ADDITIVE * pattern).sqrt());
     camera.dark_current_e_per_s = 0.0.into();
-    camera.prnu = number(pattern.sqrt() / signal);
+    camera.prnu = number(((1.0 - ADDITIVE) * pattern).sqrt() / signal);
 }
 
 fn cells(r: &mut Recipe, base: &Recipe, values: &Values, on: &impl Fn(P) -> bool, or_base: &impl Fn(P) -> f64) {

@@ -96,7 +96,7 @@ pub(crate) fn correlate(
 
 /// Variance of structure, relative to that of noise, at which half of a pixel's noise is uncorrelated: fitted to the
 /// noise on cytoplasm and nuclei of real EDF images.
-const HALF_UNCORRELATED: f64 = 15.0;
+const HALF_UNCORRELATED: f64 = 80.0;
 
 /// Amplitude of the lines along rows and columns in structured regions, relative to the noise filtered to such lines.
 const LINES: f32 = 1.5;

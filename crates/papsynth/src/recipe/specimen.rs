@@ -287,12 +287,12 @@ section! {
         endoplasm: Number (given f64) = Number::log_normal(0.08, 0.6), 0..=2;
         /// Amplitude of the first level of detail, low-frequency Gaussian noise, relative to the absorbance of the
         /// cytoplasm.
-        clouds: Number = Number::uniform(0.10, 0.34), 0..=2;
+        clouds: Number = Number::uniform(0.08, 0.28), 0..=2;
         /// Standard deviation of the smoothing of that noise.
         clouds_um: Number = Number::uniform(3.0, 14.0), 0.1..=100, "µm";
         /// Amplitude of the second level of detail, relative to the absorbance of the cytoplasm: spots, made by
         /// thresholding Brownian noise.
-        flecks: Number = Number::log_normal(0.08, 0.5).at_least(0.0).at_most(0.5), 0..=5;
+        flecks: Number = Number::log_normal(0.04, 0.5).at_least(0.0).at_most(0.5), 0..=5;
         /// Quantile of the Brownian noise at which it is thresholded: the fraction of the cell without spots.
         flecks_threshold: Number = Number::uniform(0.55, 0.85), 0..=0.999;
         /// Amplitude of the third level of detail, the cytoskeleton, relative to the absorbance of the cytoplasm.
