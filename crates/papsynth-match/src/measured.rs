@@ -235,8 +235,8 @@ fn light(field: &FieldImage, view: &Sampler, control: &Control) -> Result<Light,
     })
 }
 
-/// Returns the standard deviation of noise of an EDF image far below the highest grey level, from the standard deviation
-/// measured at `below` grey levels under it.
+/// Returns the standard deviation of noise of an EDF image far below the highest grey level, from the standard
+/// deviation measured at `below` grey levels under it.
 fn before_clipping(measured: f64, below: f64) -> f64 {
     /// Largest factor: clipping at the level itself leaves 0.58 of the standard deviation.
     const LARGEST: f64 = 2.0;

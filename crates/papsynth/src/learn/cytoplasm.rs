@@ -318,8 +318,8 @@ impl Noise {
         Ok(Self { octaves: white, typical })
     }
 
-    /// Returns the standard deviation of the noise of an image on a slide without saturation: where the slide saturates,
-    /// it shows less noise than the cells.
+    /// Returns the standard deviation of the noise of an image on a slide without saturation: where the slide
+    /// saturates, it shows less noise than the cells.
     fn of(&self, image: &CytoplasmImage) -> f64 {
         if image.noise.is_finite() { image.noise.max(self.typical) } else { 0.0 }
     }
