@@ -904,7 +904,7 @@ class Leukocytes(Section):
     """Fraction of the lobed leukocytes of a cluster that touch another one. From 0 to 1."""
 
     on_cells: Number | None = None
-    """Fraction of the clusters that are on a cell. From 0 to 1."""
+    """Fraction of the clusters that are on a cell, most of them near its rim. From 0 to 1."""
 
     form: NucleusForm | None = None
     """Shape of the nucleus."""
@@ -930,7 +930,7 @@ class Leukocytes(Section):
     """
 
     pyknotic: Number | None = None
-    """Fraction of the degenerated leukocytes whose nucleus is pyknotic: small, dark, round and smooth. From 0 to 1."""
+    """Fraction of the degenerated leukocytes whose nucleus is pyknotic: small and dark, without structure. From 0 to 1."""
 
     histiocytes: Number | None = None
     """Fraction of the lobed leukocytes that are histiocytes, which are larger and have a kidney-shaped nucleus. From 0 to
@@ -1290,9 +1290,11 @@ class SlideSection(Section):
 
 @dataclass(kw_only=True, slots=True)
 class Smudges(Section):
-    """Amorphous debris: granular clumps and fibrous shreds of remains of cells, mucus and bacteria. In 24 extended-focus
-    fields of liquid-based cytology, seven clumps per mm² have an absorbance of 0.22 or more. At 10 %, 50 % and 90 %,
-    their absorbance is 0.23, 0.27 and 0.39, and their area at half of the contrast is 21, 44 and 115 µm².
+    """Amorphous debris: granular clumps and fibrous shreds of remains of cells, mucus and bacteria, and folded shreds
+    of cytoplasm without a nucleus. In 24 extended-focus fields of liquid-based cytology, seven clumps per mm² have an
+    absorbance of 0.22 or more. At 10 %, 50 % and 90 %, their absorbance is 0.23, 0.27 and 0.39, and their area at half
+    of the contrast is 21, 44 and 115 µm². The eight normal fields have five dark folded shreds of 12 to 30 µm, counted
+    by eye: about five per mm².
     """
 
     count: Abundance | None = None
@@ -1327,6 +1329,14 @@ class Smudges(Section):
 
     fibrous: Number | None = None
     """Probability that a clump is a fibrous shred. From 0 to 1."""
+
+    at_leukocytes: Number | None = None
+    """Fraction of the clumps that collect at leukocytes, most of them between those of a cluster; these are darker and
+    larger. From 0 to 1.
+    """
+
+    folded: Number | None = None
+    """Probability that a clump is a folded shred of cytoplasm, which is darker and larger. From 0 to 1."""
 
 
 @dataclass(kw_only=True, slots=True)

@@ -41,6 +41,13 @@ const RIM_UM: f64 = 0.45;
 /// Relative increase of absorbance in the rim.
 const RIM: f32 = 0.15;
 
+/// Irregularity of the outline: standard deviation of the second harmonic.
+const IRREGULAR: f64 = 0.055;
+/// Width over which the absorbance falls towards the outline, µm: minimum, maximum.
+const EDGE_UM: [f64; 2] = [0.3, 1.2];
+/// Number of steps of this fall.
+const EDGE_STEPS: u8 = 4;
+
 /// Size (standard deviation) of clumps of chromatin, µm.
 const CLUMP_UM: f64 = 0.35;
 
@@ -55,7 +62,9 @@ impl BareNucleus {
     pub(super) fn phantom(&self, context: &ObjectContext<'_>) -> Phantom {
         let mut rng = context.stream("shape");
         let stretch = self.elongation.sqrt();
-        let shape = perturbed_circle(self.radius_um, 0.04, 0.08, &mut rng);
+        let mut shape = perturbed_circle(self.radius_um, 0.04, 0.08, &mut rng);
+        make_irregular(&mut shape, IRREGULAR, &mut rng);
+        let edge_um = random::between(EDGE_UM[0], EDGE_UM[1], &mut rng);
         let scaled = |by: f64| -> Vec<Point> {
             shape.iter().map(|p| context.to_grid([by * stretch * p[0], by * p[1] / stretch])).collect()
         };
@@ -67,6 +76,15 @@ impl BareNucleus {
         nucleus.shade_by_coverage(&inner.values, |cover, inner| {
             self.absorbance as f32 * (cover + RIM * (cover - inner).max(0.0))
         });
+        // A swollen nucleus is thinner towards its outline.
+        let mut thinner = nucleus.coverage.blank();
+        for step in 1..=EDGE_STEPS {
+            let mut within = nucleus.coverage.blank();
+            within.cover(&scaled((1.0 - edge_um * f64::from(step) / f64::from(EDGE_STEPS) / self.radius_um).max(0.0)));
+            thinner.values.iter_mut().zip(&within.values).for_each(|(sum, value)| *sum += value);
+        }
+        let levels = nucleus.absorbance.values.iter_mut().zip(&thinner.values);
+        levels.for_each(|(value, sum)| *value *= (1.0 + sum) / (1.0 + f32::from(EDGE_STEPS)));
         let sampler = FieldSampler::clouds(context.px(CLUMP_UM), &mut rng);
         nucleus.texture(context.noise_fields.clouds(), &sampler, self.texture as f32);
         let mut shreds = nucleus.blank();

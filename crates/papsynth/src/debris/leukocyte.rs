@@ -41,7 +41,7 @@ section! {
         cluster_radius_um: Number = Number::uniform(8.0, 20.0), 0..=1000, "µm";
         /// Fraction of the lobed leukocytes of a cluster that touch another one.
         touching: Number = 0.7, 0..=1;
-        /// Fraction of the clusters that are on a cell.
+        /// Fraction of the clusters that are on a cell, most of them near its rim.
         on_cells: Number = 0.45, 0..=1;
         /// Shape of the nucleus.
         form: NucleusForm = NucleusForm::Lobed;
@@ -57,7 +57,7 @@ section! {
         cytoplasm_diameter_um: Number = Number::normal(10.2, 1.1).at_least(7.0), 1..=100, "µm";
         /// Probability that a lobed leukocyte is degenerated, with a smudged or pyknotic nucleus and frayed cytoplasm.
         degenerated: Number = 0.25, 0..=1;
-        /// Fraction of the degenerated leukocytes whose nucleus is pyknotic: small, dark, round and smooth.
+        /// Fraction of the degenerated leukocytes whose nucleus is pyknotic: small and dark, without structure.
         pyknotic: Number = 0.4, 0..=1;
         /// Fraction of the lobed leukocytes that are histiocytes, which are larger and have a kidney-shaped nucleus.
         histiocytes: Number = 0.04, 0..=1;
@@ -92,7 +92,7 @@ pub struct Leukocyte {
     pub cytoplasm_diameter_um: f64,
     /// Whether the nucleus is smudged or pyknotic and the cytoplasm frayed.
     pub degenerated: bool,
-    /// Whether the nucleus is small, dark, round and smooth.
+    /// Whether the nucleus is small and dark, without structure.
     pub pyknotic: bool,
     /// Whether granular remains and shreds of mucus stick to the leukocyte.
     pub remains: bool,
@@ -105,7 +105,7 @@ impl Leukocytes {
         let dyes = placer.dyes(&CYTOPLASM_DYES);
         for index in 0..placer.count(named!(self.clusters)) {
             let mut rng = placer.stream(index, "cluster");
-            let cluster = placer.cluster(&self.on_cells, &self.cluster_radius_um, &mut rng);
+            let cluster = placer.cluster_within(ON_CELL, &self.on_cells, &self.cluster_radius_um, &mut rng);
             let mut taken: Vec<[f64; 2]> = Vec::new();
             for member in 0..self.per_cluster.draw_count(&mut rng).max(1) as u64 {
                 let number = member_number(index, member);
@@ -213,6 +213,9 @@ const PYKNOTIC_ABSORBANCE: [f64; 2] = [1.1, 1.4];
 const SMUDGED_RADIUS: [f64; 2] = [0.85, 1.15];
 /// Absorbance of a smudged nucleus relative to an intact one: minimum, maximum.
 const SMUDGED_ABSORBANCE: [f64; 2] = [0.55, 0.95];
+
+/// Distance of clusters from the centre of a cell, relative to its radius: minimum, maximum. Half are beyond 0.9.
+const ON_CELL: [f64; 2] = [0.4, 1.1];
 
 /// Minimum distance of round leukocytes, in radii; closer positions are drawn again.
 const MIN_DISTANCE: f64 = 1.5;

@@ -57,7 +57,7 @@ pub use speckle::{SpeckForm, Speckle, Speckles};
 pub use trichomonad::{Trichomonad, Trichomonads};
 
 pub(crate) use object_context::ObjectContext;
-use placement::{Field, KindPlacer, PlacedObject};
+use placement::{CellPosition, Field, KindPlacer, PlacedObject};
 
 /// Imports shared by the files of the kinds.
 mod prelude {
@@ -70,7 +70,7 @@ mod prelude {
     pub(super) use super::placement::{Cluster, Clusters, KindPlacer, Placement, cluster_id, member_number, near};
     pub(super) use crate::key::Stream;
     pub(super) use crate::phantom::noise_fields::FieldSampler;
-    pub(super) use crate::phantom::parametric_shape::{perturbed_circle, placed, smooth, textured};
+    pub(super) use crate::phantom::parametric_shape::{make_irregular, perturbed_circle, placed, smooth, textured};
     pub(super) use crate::phantom::piece::{MIN_ABSORBANCE, Phantom};
     pub(super) use crate::phantom::tile::{Point, Tile, area};
     pub(super) use crate::random;
@@ -196,11 +196,14 @@ macro_rules! kinds {
 
             /// Draws all debris on a slide with these cells, kind by kind.
             pub(crate) fn draw(&self, field: &Field<'_>) -> Vec<PlacedObject<Body>> {
-                let mut objects = Vec::new();
+                let mut objects: Vec<PlacedObject<Body>> = Vec::new();
                 $({
                     let kind = ObjectKind::$Kind;
                     let in_margin = self.$field.$count.is_density();
                     let mut placer = KindPlacer::new(field, kind.name(), stringify!($field), kind.is_on_glass(), in_margin);
+                    if kind == ObjectKind::Smudge {
+                        placer = placer.with_leukocytes(objects.iter().filter_map(leukocyte));
+                    }
                     self.$field.draw(&mut placer);
                     objects.extend(placer.objects.into_iter().map(|PlacedObject { number, cluster, placement, body }| {
                         PlacedObject { number, cluster, placement, body: Body::$Kind(body) }
@@ -210,6 +213,14 @@ macro_rules! kinds {
             }
         }
     };
+}
+
+/// Returns the cluster and position of an object that is a leukocyte.
+fn leukocyte(object: &PlacedObject<Body>) -> Option<(u32, CellPosition)> {
+    let Body::Leukocyte(body) = &object.body else { return None };
+    let (centre_um, depth_um) = (object.placement.centre_um, object.placement.depth_um);
+    let radius_um = (0.5 * body.cytoplasm_diameter_um).max(body.radius_um);
+    Some((object.cluster, CellPosition { centre_um, depth_um, radius_um }))
 }
 
 // Section of the recipe, its key for the number of objects, and the drawn type.

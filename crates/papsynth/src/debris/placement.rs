@@ -32,6 +32,8 @@ pub(crate) struct KindPlacer<'a, T> {
     is_on_glass: bool,
     /// Whether objects are also placed in the margin of the field.
     in_margin: bool,
+    /// Leukocytes at which debris collects, with their cluster.
+    leukocytes: Vec<(u32, CellPosition)>,
     pub(super) objects: Vec<PlacedObject<T>>,
 }
 
@@ -95,6 +97,18 @@ const ON_CELL_UM: f64 = 0.8;
 /// Fraction of the objects at a cell that are below it.
 const BELOW_CELL: f64 = 0.25;
 
+/// Distance from the centre of a cell of objects on it, relative to its radius: minimum, maximum.
+const ON_CELL: [f64; 2] = [0.0, 0.9];
+
+/// Number of leukocytes of which debris collects at the one with the largest cluster.
+const CANDIDATES: usize = 2;
+/// Maximum distance of leukocytes between which debris collects, in diameters.
+const BETWEEN: f64 = 2.2;
+/// Distance of debris between two leukocytes from the line between them (standard deviation), in diameters.
+const BESIDE: f64 = 0.3;
+/// Distance of debris from a leukocyte without neighbours, in diameters: minimum, maximum.
+const AT_LEUKOCYTE: [f64; 2] = [0.35, 0.85];
+
 impl<'a, T> KindPlacer<'a, T> {
     pub(super) fn new(
         field: &'a Field<'a>,
@@ -103,7 +117,53 @@ impl<'a, T> KindPlacer<'a, T> {
         is_on_glass: bool,
         in_margin: bool,
     ) -> Self {
-        Self { field, kind, section, is_on_glass, in_margin, objects: Vec::new() }
+        Self { field, kind, section, is_on_glass, in_margin, leukocytes: Vec::new(), objects: Vec::new() }
+    }
+
+    /// Sets the leukocytes at which debris collects, with their clusters.
+    pub(super) fn with_leukocytes(mut self, leukocytes: impl Iterator<Item = (u32, CellPosition)>) -> Self {
+        let region = self.region();
+        self.leukocytes = leukocytes.filter(|(_, leukocyte)| region.touches(leukocyte.centre_um, 0.0)).collect();
+        self
+    }
+
+    /// Draws a position between neighbouring leukocytes, or beside one, with its depth; `None` without leukocytes.
+    pub(super) fn at_leukocytes(&self, rng: &mut Stream) -> Option<([f64; 2], f64)> {
+        let others = |index: usize| {
+            let (cluster, leukocyte) = &self.leukocytes[index];
+            let close = move |(of, other): &&(u32, CellPosition)| {
+                let distance = (of == cluster).then_some(BETWEEN * 2.0 * leukocyte.radius_um);
+                distance.is_some_and(|distance| {
+                    near(other.centre_um, leukocyte.centre_um, distance) && other.centre_um != leukocyte.centre_um
+                })
+            };
+            self.leukocytes.iter().filter(close).map(|(_, other)| other).collect::<Vec<_>>()
+        };
+        if self.leukocytes.is_empty() {
+            return None;
+        }
+        let mut candidate = || {
+            let index = random::below(self.leukocytes.len(), rng);
+            (index, others(index))
+        };
+        let first = candidate();
+        let (index, others) = (1..CANDIDATES).fold(first, |most, _| {
+            let next = candidate();
+            if next.1.len() > most.1.len() { next } else { most }
+        });
+        let leukocyte = &self.leukocytes[index].1;
+        let ([x, y], diameter_um) = (leukocyte.centre_um, 2.0 * leukocyte.radius_um);
+        let position = if others.is_empty() {
+            let distance = diameter_um * random::between(AT_LEUKOCYTE[0], AT_LEUKOCYTE[1], rng);
+            let angle = random::direction(rng);
+            [x + distance * libm::cos(angle), y + distance * libm::sin(angle)]
+        } else {
+            let other = others[random::below(others.len(), rng)].centre_um;
+            let along = random::uniform(rng);
+            let mut off = || BESIDE * diameter_um * random::normal(rng);
+            [x + along * (other[0] - x) + off(), y + along * (other[1] - y) + off()]
+        };
+        Some((position, leukocyte.depth_um + 0.5 * random::normal(rng)))
     }
 
     /// Draws the number of objects or clusters in the field or plot.
@@ -153,6 +213,17 @@ impl<'a, T> KindPlacer<'a, T> {
 
     /// Draws a cluster on a cell or anywhere.
     pub(super) fn cluster(&self, on_cells: &Number, radius_um: &Number, rng: &mut Stream) -> Cluster {
+        self.cluster_within(ON_CELL, on_cells, radius_um, rng)
+    }
+
+    /// Draws a cluster on a cell, at a distance from its centre relative to its radius, or anywhere.
+    pub(super) fn cluster_within(
+        &self,
+        [nearest, farthest]: [f64; 2],
+        on_cells: &Number,
+        radius_um: &Number,
+        rng: &mut Stream,
+    ) -> Cluster {
         let on_cell = random::chance(on_cells.draw(rng), rng);
         let radius_um = radius_um.draw(rng);
         let cell = random::below(self.cells().len(), rng);
@@ -160,7 +231,7 @@ impl<'a, T> KindPlacer<'a, T> {
         let anywhere = self.anywhere(rng);
         match self.cells().get(cell) {
             Some(cell) if on_cell => {
-                let reach = distance * cell.radius_um * 0.9;
+                let reach = (nearest + distance * (farthest - nearest)) * cell.radius_um;
                 let centre_um =
                     [cell.centre_um[0] + reach * libm::cos(angle), cell.centre_um[1] + reach * libm::sin(angle)];
                 Cluster { centre_um, depth_um: cell.depth_um + ON_CELL_UM, radius_um }

@@ -1,14 +1,18 @@
-//! Amorphous debris: granular clumps with frayed rims, and fibrous shreds.
+//! Amorphous debris: granular clumps with frayed rims, fibrous shreds, and folded shreds of cytoplasm.
+
+mod folded;
 
 use super::prelude::*;
 use super::tuft::{Tuft, crop};
 
 section! {
-    /// Amorphous debris: granular clumps and fibrous shreds of remains of cells, mucus and bacteria.
+    /// Amorphous debris: granular clumps and fibrous shreds of remains of cells, mucus and bacteria, and folded shreds of
+    /// cytoplasm without a nucleus.
     ///
     /// In 24 extended-focus fields of liquid-based cytology, seven clumps per mm² have an absorbance of 0.22 or more.
     /// At 10 %, 50 % and 90 %, their absorbance is 0.23, 0.27 and 0.39, and their area at half of the contrast is 21,
-    /// 44 and 115 µm².
+    /// 44 and 115 µm². The eight normal fields have five dark
+    /// folded shreds of 12 to 30 µm, counted by eye: about five per mm².
     pub struct Smudges, drawn from rng as pub Smudge {
         /// Number of clumps; drawn once per field.
         count: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(100.0, 0.8)), 0..=100000, "per field or per mm²";
@@ -32,15 +36,52 @@ section! {
         dyes: DyeAmounts = DyeAmounts { light_green: 1.0, haematein: 0.35, eosin_y: 0.6, orange_g: 0.3, neutral: 0.2 };
         /// Probability that a clump is a fibrous shred.
         fibrous: Number (Chance as fibrous: "Whether it is a fibrous shred.") = 0.25, 0..=1;
+        /// Fraction of the clumps that collect at leukocytes, most of them between those of a cluster; these are darker
+        /// and larger.
+        at_leukocytes: Number (undrawn) = 0.4, 0..=1;
+        /// Probability that a clump is a folded shred of cytoplasm, which is darker and larger.
+        folded: Number (Chance as folded: "Whether it is a folded shred of cytoplasm.") = 0.06, 0..=1;
     }
 }
 
 impl Smudges {
     pub(super) fn draw(&self, placer: &mut KindPlacer<'_, Smudge>) {
         let dyes = placer.dyes(&self.dyes);
-        placer.place_on_cells(named!(self.count), &self.on_cells, |rng| Smudge { dyes, ..self.one(rng) });
+        placer.place_on_cells(named!(self.count), &self.on_cells, |rng| {
+            let smudge = Smudge { dyes, ..self.one(rng) };
+            if smudge.folded { smudge.enlarged(FOLDED) } else { smudge }
+        });
+        let mut objects = core::mem::take(&mut placer.objects);
+        for object in &mut objects {
+            let mut rng = placer.stream(object.number, "collected");
+            if random::chance(self.at_leukocytes.draw(&mut rng), &mut rng) {
+                if let Some((centre_um, depth_um)) = placer.at_leukocytes(&mut rng) {
+                    (object.placement.centre_um, object.placement.depth_um) = (centre_um, depth_um);
+                    if !object.body.folded {
+                        object.body = object.body.enlarged(COLLECTED);
+                    }
+                }
+            }
+        }
+        placer.objects = objects;
     }
 }
+
+/// Factors on the diameter and absorbance of special clumps, and their limits.
+struct Enlarged {
+    diameter: f64,
+    /// Minimum and maximum, µm.
+    diameters_um: [f64; 2],
+    absorbance: f64,
+    absorbances: [f64; 2],
+}
+
+/// Clumps at leukocytes.
+const COLLECTED: Enlarged =
+    Enlarged { diameter: 1.6, diameters_um: [6.0, 22.0], absorbance: 2.5, absorbances: [0.08, 0.3] };
+/// Folded shreds; the absorbance is that of one layer.
+const FOLDED: Enlarged =
+    Enlarged { diameter: 2.5, diameters_um: [11.0, 40.0], absorbance: 2.0, absorbances: [0.1, 0.17] };
 
 /// Elongation of a shred relative to a granular clump.
 const SHRED_ELONGATION: f64 = 1.5;
@@ -62,18 +103,36 @@ const BEND: f64 = 0.25;
 const FAN: f64 = 0.12;
 
 impl Smudge {
+    /// Returns the clump with other values; those outside the limits move towards them, but not beyond.
+    fn enlarged(self, by: Enlarged) -> Self {
+        let toward = |value: f64, factor: f64, [low, high]: [f64; 2]| (value * factor).max(low).min(high.max(value));
+        Self {
+            diameter_um: toward(self.diameter_um, by.diameter, by.diameters_um),
+            absorbance: if self.absorbance > 0.0 {
+                toward(self.absorbance, by.absorbance, by.absorbances)
+            } else {
+                0.0
+            },
+            ..self
+        }
+    }
+
     pub(super) fn reach_um(&self, _pixel_um: f64) -> f64 {
         0.5 * self.diameter_um * self.elongation().sqrt() * Tuft::extent(self.ragged)
     }
 
     /// Returns its length relative to its width.
     fn elongation(&self) -> f64 {
-        if self.fibrous { SHRED_ELONGATION * self.elongation } else { self.elongation }
+        if self.fibrous && !self.folded { SHRED_ELONGATION * self.elongation } else { self.elongation }
     }
 
     pub(super) fn phantom(&self, context: &ObjectContext<'_>) -> Phantom {
         let mut rng = context.stream("shape");
-        let mut canvas = if self.fibrous { self.shred(context, &mut rng) } else { self.clump(context, &mut rng) };
+        let mut canvas = match (self.folded, self.fibrous) {
+            (true, _) => folded::draw(self, context, &mut rng),
+            (false, true) => self.shred(context, &mut rng),
+            (false, false) => self.clump(context, &mut rng),
+        };
         crop(&mut canvas, context, context.px(self.reach_um(context.pixel_um)));
         canvas.into_phantom(self.dyes, self.phase_rad, self.absorbance)
     }

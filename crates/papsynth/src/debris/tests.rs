@@ -101,13 +101,16 @@ fn counts_match_the_recipe() {
 
 #[test]
 fn a_phantom_does_not_depend_on_other_objects() {
-    let mut all = Debris::none();
+    // Positions of clumps at leukocytes depend on these.
+    let apart =
+        || Debris { smudges: Smudges { at_leukocytes: 0.0.into(), ..Debris::none().smudges }, ..Debris::none() };
+    let mut all = apart();
     for kind in ObjectKind::ALL {
         counted(&mut all, kind, 2.0);
     }
     let among = phantoms(&draw(&all));
     for kind in ObjectKind::ALL.into_iter().skip(1) {
-        let mut debris = Debris::none();
+        let mut debris = apart();
         counted(&mut debris, kind, 1.0);
         let alone = phantoms(&draw(&debris));
         let same = among.iter().filter(|(other, _)| *other == kind);
@@ -442,4 +445,36 @@ fn every_variant_of_leukocytes_and_debris_occurs() {
     let scene = draw(&debris);
     let fibrous = scene.objects.iter().filter(|o| matches!(&o.body, Body::Smudge(smudge) if smudge.fibrous)).count();
     assert!((30..70).contains(&fibrous), "{fibrous}");
+    let folded = scene.objects.iter().filter(|o| matches!(&o.body, Body::Smudge(smudge) if smudge.folded)).count();
+    assert!((4..24).contains(&folded), "{folded}");
+}
+
+#[test]
+fn debris_collects_at_leukocytes() {
+    let mut debris = Debris::none();
+    (debris.leukocytes.clusters, debris.leukocytes.per_cluster) = (3.0.into(), 5.0.into());
+    debris.smudges.count = 200.0.into();
+    let near = |debris: &Debris| {
+        let mut recipe = recipe(debris.clone());
+        (recipe.field.width_px, recipe.field.height_px) = (600.0.into(), 450.0.into());
+        let scene = scene::draw(&recipe, &Model::builtin(), None, KEY).unwrap();
+        let leukocytes = bodies(&scene);
+        let clumps = scene.objects.iter().filter(|object| object.body.kind() == ObjectKind::Smudge);
+        let near = |object: &&Object| {
+            leukocytes.iter().any(|(_, centre_um, _)| square(*centre_um, object.centre_um) < 10.0 * 10.0)
+        };
+        (clumps.clone().filter(near).count(), clumps.count())
+    };
+    debris.smudges.at_leukocytes = 1.0.into();
+    let all = near(&debris);
+    debris.smudges.at_leukocytes = 0.0.into();
+    let none = near(&debris);
+    assert!(all.0 >= 190 && all.1 == 200 && none.0 < 40 && none.1 == 200, "{all:?} {none:?}");
+    // Without leukocytes, clumps stay where they are.
+    debris.leukocytes.clusters = 0.0.into();
+    let positions = |at: f64| {
+        let smudges = Smudges { at_leukocytes: at.into(), ..debris.smudges.clone() };
+        draw(&Debris { smudges, ..debris.clone() }).objects
+    };
+    assert_eq!(positions(1.0), positions(0.0));
 }

@@ -7,7 +7,7 @@ use super::assets::ClassAssets;
 use super::cell_context::CellContext;
 use super::chromatin::standardise;
 use super::noise_fields::{FieldSampler, SIDE, Texels};
-use super::parametric_shape::{perturbed_circle, placed};
+use super::parametric_shape::{make_irregular, perturbed_circle, placed};
 use super::piece::Piece;
 use super::tile::{Point, Tile, area, scaled_about};
 use crate::error::ErrorKind;
@@ -32,6 +32,12 @@ const WRINKLES: core::ops::RangeInclusive<u32> = 3..=7;
 /// Amplitude of the strongest wrinkles, relative to the radius.
 const WRINKLE: f64 = 0.075;
 
+/// Irregularity of the outline of a pyknotic nucleus: standard deviation of the second harmonic.
+const PYKNOTIC: f64 = 0.07;
+
+/// Minimum width of the edge of a pyknotic nucleus, µm.
+const PYKNOTIC_EDGE_UM: f64 = 0.3;
+
 /// Fraction of the edge blur in its truncated tails.
 const EDGE_TAIL: f64 = 1e-3;
 
@@ -47,11 +53,15 @@ pub(super) fn make(cell: &CellContext<'_>, class: &ClassAssets) -> Result<Piece,
     if nucleus.wrinkle > 0.0 {
         wrinkle(&mut outline, nucleus.wrinkle * WRINKLE, &mut shape_rng);
     }
+    if nucleus.pyknotic {
+        make_irregular(&mut outline, PYKNOTIC, &mut cell.stream("nucleus.pyknotic"));
+    }
     let [dx, dy] = nucleus.off_centre.map(|fraction| fraction * body.radius_um / pixel_um);
     let centre = [cell_centre[0] + dx, cell_centre[1] + dy];
     let outline: Vec<Point> = outline.iter().map(|p| placed(*p, nucleus.rotation_deg.to_radians(), centre)).collect();
 
-    let edge = Gaussian::truncated(nucleus.edge_um / pixel_um, Method::Direct, EDGE_TAIL)?;
+    let edge_um = if nucleus.pyknotic { nucleus.edge_um.max(PYKNOTIC_EDGE_UM) } else { nucleus.edge_um };
+    let edge = Gaussian::truncated(edge_um / pixel_um, Method::Direct, EDGE_TAIL)?;
     let mut coverage = Tile::around(&outline, 2.0 + edge.radius() as f64);
     coverage.cover(&outline);
     let mut inner = coverage.blank();

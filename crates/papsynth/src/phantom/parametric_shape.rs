@@ -3,7 +3,7 @@
 use perlin_bg::{Fractal, FractalParams, Window};
 use rand_core::Rng;
 
-use super::tile::{Point, Tile};
+use super::tile::{Point, Tile, area};
 use crate::random;
 
 /// Points of the perturbed circle before it is smoothed (K of Eq. 7).
@@ -27,6 +27,31 @@ pub(crate) fn perturbed_circle<R: Rng + ?Sized>(radius: f64, alpha: f64, beta: f
         })
         .collect();
     smooth(&corners, POINTS_PER_CORNER)
+}
+
+/// Harmonics of an irregular outline.
+const HARMONICS: core::ops::RangeInclusive<u32> = 2..=6;
+
+/// Multiplies the distances of the points of an outline from the origin by 1 plus harmonics of random phase, with the
+/// same area: slightly lobed and angular. The second harmonic has the standard deviation `strength`, the others less.
+pub(crate) fn make_irregular<R: Rng + ?Sized>(outline: &mut [Point], strength: f64, rng: &mut R) {
+    let before = area(outline).abs();
+    let waves: Vec<[f64; 3]> = HARMONICS
+        .map(|harmonic| {
+            let amplitude = strength * random::normal(rng) * (2.0 / f64::from(harmonic)).sqrt();
+            [f64::from(harmonic), amplitude, random::direction(rng)]
+        })
+        .collect();
+    for [x, y] in outline.iter_mut() {
+        let angle = libm::atan2(*y, *x);
+        let push: f64 = waves.iter().map(|[h, amplitude, phase]| amplitude * libm::cos(h * angle + phase)).sum();
+        let scale = (1.0 + push).clamp(0.6, 1.4);
+        (*x, *y) = (*x * scale, *y * scale);
+    }
+    let scale = (before / area(outline).abs().max(f64::MIN_POSITIVE)).sqrt();
+    for point in outline {
+        *point = point.map(|v| v * scale);
+    }
 }
 
 /// Returns a closed Catmull–Rom curve through the corners, with `points` points per corner.
@@ -91,5 +116,25 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn irregular_outlines_keep_their_area_and_are_not_round() {
+        let mut rng = Key { seed: 2, index: 0 }.stream("test", 0, "irregular");
+        let circle = perturbed_circle(4.0, 0.0, 0.0, &mut rng);
+        let mut spread = 0.0;
+        for _ in 0..200 {
+            let mut outline = circle.clone();
+            make_irregular(&mut outline, 0.06, &mut rng);
+            assert!((area(&outline) / area(&circle) - 1.0).abs() < 1e-9);
+            assert!(!fsd_shape::self_intersects(&outline));
+            let radii: Vec<f64> = outline.iter().map(|[x, y]| (x * x + y * y).sqrt() / 4.0).collect();
+            let mean = radii.iter().sum::<f64>() / radii.len() as f64;
+            spread += (radii.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>() / radii.len() as f64).sqrt() / 200.0;
+        }
+        assert!((0.04..0.10).contains(&spread), "{spread}");
+        let mut same = circle.clone();
+        make_irregular(&mut same, 0.0, &mut rng);
+        assert!(same.iter().zip(&circle).all(|(a, b)| (a[0] - b[0]).abs() + (a[1] - b[1]).abs() < 1e-9));
     }
 }

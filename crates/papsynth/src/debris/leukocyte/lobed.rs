@@ -50,6 +50,9 @@ const RIM: f64 = 0.15;
 /// The same for a smudged nucleus.
 const SMUDGED_RIM: f64 = 0.1;
 
+/// Irregularity of the outline of a pyknotic nucleus: standard deviation of the second harmonic.
+const IRREGULAR: f64 = 0.06;
+
 /// Contrast of the chromatin of an intact nucleus: minimum, maximum.
 const CHROMATIN: [f64; 2] = [0.05, 0.18];
 /// Contrast of the chromatin of a smudged nucleus.
@@ -88,7 +91,10 @@ pub(super) fn make(leukocyte: &Leukocyte, context: &ObjectContext<'_>) -> Phanto
     let shapes: Vec<Vec<Point>> = lobes
         .iter()
         .map(|lobe| {
-            let shape = perturbed_circle(lobe.radius, leukocyte.alpha, leukocyte.beta, &mut rng);
+            let mut shape = perturbed_circle(lobe.radius, leukocyte.alpha, leukocyte.beta, &mut rng);
+            if leukocyte.pyknotic {
+                make_irregular(&mut shape, IRREGULAR, &mut rng);
+            }
             let stretch = |p: &Point| [p[0] * lobe.stretch, p[1] / lobe.stretch];
             let turned = shape.iter().map(|p| placed(stretch(p), lobe.heading, lobe.centre));
             turned.map(|p| context.to_grid([p[0] + at[0], p[1] + at[1]])).collect()
@@ -182,7 +188,7 @@ fn lobes(leukocyte: &Leukocyte, cell_radius: f64, rng: &mut Stream) -> Vec<Lobe>
     let radius = leukocyte.radius_um / (1.0 + (count - 1) as f64 * free).sqrt();
     let bend = random::between(row.turn[0], row.turn[1], rng) * if random::chance(0.5, rng) { 1.0 } else { -1.0 };
     let stretches = match (leukocyte.pyknotic, count) {
-        (true, _) => [1.0, 1.05],
+        (true, _) => [1.0, 1.15],
         (false, 1) => [1.05, 1.35],
         (false, _) => [1.0, 1.15],
     };
