@@ -1290,8 +1290,8 @@ class SlideSection(Section):
 
 @dataclass(kw_only=True, slots=True)
 class Smudges(Section):
-    """Amorphous debris: granular clumps and fibrous shreds of remains of cells, mucus and bacteria, and folded shreds
-    of cytoplasm without a nucleus. In 24 extended-focus fields of liquid-based cytology, seven clumps per mm² have an
+    """Amorphous debris: granular clumps and fibrous shreds of remains of cells, mucus and bacteria, and folded shreds of
+    cytoplasm without a nucleus. In 24 extended-focus fields of liquid-based cytology, seven clumps per mm² have an
     absorbance of 0.22 or more. At 10 %, 50 % and 90 %, their absorbance is 0.23, 0.27 and 0.39, and their area at half
     of the contrast is 21, 44 and 115 µm². The eight normal fields have five dark folded shreds of 12 to 30 µm, counted
     by eye: about five per mm².
