@@ -6,8 +6,8 @@ use super::prelude::*;
 use super::tuft::{Tuft, crop};
 
 section! {
-    /// Amorphous debris: granular clumps and fibrous shreds of remains of cells, mucus and bacteria, and folded shreds of
-    /// cytoplasm without a nucleus.
+    /// Amorphous debris: granular clumps and fibrous shreds of remains of cells, mucus and bacteria, and folded shreds
+    /// of cytoplasm without a nucleus.
     ///
     /// In 24 extended-focus fields of liquid-based cytology, seven clumps per mm² have an absorbance of 0.22 or more.
     /// At 10 %, 50 % and 90 %, their absorbance is 0.23, 0.27 and 0.39, and their area at half of the contrast is 21,
@@ -49,17 +49,17 @@ impl Smudges {
         let dyes = placer.dyes(&self.dyes);
         placer.place_on_cells(named!(self.count), &self.on_cells, |rng| {
             let smudge = Smudge { dyes, ..self.one(rng) };
-            if smudge.folded { smudge.enlarged(FOLDED) } else { smudge }
+            if smudge.folded { smudge.enlarged(&FOLDED) } else { smudge }
         });
         let mut objects = core::mem::take(&mut placer.objects);
         for object in &mut objects {
             let mut rng = placer.stream(object.number, "collected");
-            if random::chance(self.at_leukocytes.draw(&mut rng), &mut rng) {
-                if let Some((centre_um, depth_um)) = placer.at_leukocytes(&mut rng) {
-                    (object.placement.centre_um, object.placement.depth_um) = (centre_um, depth_um);
-                    if !object.body.folded {
-                        object.body = object.body.enlarged(COLLECTED);
-                    }
+            if random::chance(self.at_leukocytes.draw(&mut rng), &mut rng)
+                && let Some((centre_um, depth_um)) = placer.at_leukocytes(&mut rng)
+            {
+                (object.placement.centre_um, object.placement.depth_um) = (centre_um, depth_um);
+                if !object.body.folded {
+                    object.body = object.body.enlarged(&COLLECTED);
                 }
             }
         }
@@ -104,7 +104,7 @@ const FAN: f64 = 0.12;
 
 impl Smudge {
     /// Returns the clump with other values; those outside the limits move towards them, but not beyond.
-    fn enlarged(self, by: Enlarged) -> Self {
+    fn enlarged(self, by: &Enlarged) -> Self {
         let toward = |value: f64, factor: f64, [low, high]: [f64; 2]| (value * factor).max(low).min(high.max(value));
         Self {
             diameter_um: toward(self.diameter_um, by.diameter, by.diameters_um),
