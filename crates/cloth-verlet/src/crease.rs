@@ -14,8 +14,13 @@ const STRIPS: u32 = 12;
 /// Distance from a line, as a fraction of the radius, within which a vertex counts as on it; avoids sliver triangles.
 const ON_LINE: f64 = 1e-6;
 const MOST_TURNS: u32 = 100;
+/// Largest number of parts of a side that follows a curved line.
+const MOST_PARTS: f64 = 1000.0;
 
-/// A straight fold. The part of the sheet beyond the line is bent up around a tube on that line, without stretching.
+/// A fold along a line or a parabola. The part of the sheet beyond it is bent up around a tube on it.
+///
+/// A straight fold does not stretch the sheet. A curved one is a straight one of a sheared sheet: it preserves areas,
+/// and stretches by about the distance from the vertex times the curvature.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crease {
     /// A point of the line.
@@ -23,6 +28,9 @@ pub struct Crease {
     /// Direction of the line, as an angle from +x towards +y. The side in the direction (−sin, cos) is beyond the
     /// line.
     pub direction_rad: f64,
+    /// Curvature at `point`, which is the vertex of a parabola, in 1 over the unit of the sheet: 0 is a straight line,
+    /// a positive one bends towards the side beyond.
+    pub curvature: f64,
     /// Radius of the tube in the unit of the sheet, above 0.
     pub radius: f64,
     /// Flap or roll.
@@ -47,6 +55,7 @@ impl Crease {
         range("point[0]", self.point[0], finite, "finite")?;
         range("point[1]", self.point[1], finite, "finite")?;
         range("direction_rad", self.direction_rad, finite, "finite")?;
+        range("curvature", self.curvature, finite, "finite")?;
         range("radius", self.radius, (f64::MIN_POSITIVE, f64::MAX), "above 0 and finite")?;
         match self.kind {
             FoldKind::Flap => Ok(()),
@@ -57,6 +66,19 @@ impl Crease {
     /// Returns the direction beyond the line.
     fn normal(&self) -> Point {
         [-libm::sin(self.direction_rad), libm::cos(self.direction_rad)]
+    }
+
+    /// Returns the coordinates of a point along and beyond the line: s = n − κt²/2.
+    fn sheared(&self, [x, y]: Point) -> Point {
+        let (normal, [x, y]) = (self.normal(), [x - self.point[0], y - self.point[1]]);
+        let t = x * normal[1] - y * normal[0];
+        [t, x * normal[0] + y * normal[1] - 0.5 * self.curvature * t * t]
+    }
+
+    /// Returns the point with these coordinates along and beyond the line.
+    fn point_at(&self, [t, s]: Point) -> Point {
+        let (normal, n) = (self.normal(), s + 0.5 * self.curvature * t * t);
+        [self.point[0] + t * normal[1] + n * normal[0], self.point[1] - t * normal[0] + n * normal[1]]
     }
 
     fn half_turns(&self) -> u32 {
@@ -97,8 +119,7 @@ impl Sheet {
     pub fn fold(&mut self, crease: &Crease) -> Result<(), Error> {
         crease.check()?;
         let normal = crease.normal();
-        let beyond = |v: &[f64; 3]| (v[0] - crease.point[0]) * normal[0] + (v[1] - crease.point[1]) * normal[1];
-        let mut far: Vec<f64> = self.vertices.iter().map(beyond).collect();
+        let mut far: Vec<f64> = self.vertices.iter().map(|v| crease.sheared([v[0], v[1]])[1]).collect();
         let end = far.iter().fold(0.0_f64, |m, &s| m.max(s));
         if end == 0.0 {
             return Ok(());
@@ -208,19 +229,11 @@ fn between<'a>(first: &'a [u32], second: &'a [u32], far: &'a [f64]) -> impl Iter
 pub fn crease_outline(outline: &[Point], crease: &Crease) -> Result<Vec<Vec<Point>>, Error> {
     crease.check()?;
     crate::outline::Outline::new(outline)?;
-    let normal = crease.normal();
-    let along = [normal[1], -normal[0]];
-    // Coordinates along the line and beyond it.
-    let polygon: Vec<Point> = outline
-        .iter()
-        .map(|p| [p[0] - crease.point[0], p[1] - crease.point[1]])
-        .map(|[x, y]| [x * along[0] + y * along[1], x * normal[0] + y * normal[1]])
-        .collect();
+    // Sides longer than this differ from the parabola by more than a hundredth of the radius.
+    let longest = (0.08 * crease.radius / crease.curvature.abs()).sqrt();
+    let polygon: Vec<Point> = finely(outline, longest).into_iter().map(|p| crease.sheared(p)).collect();
     let end = polygon.iter().fold(0.0_f64, |m, p| m.max(p[1]));
     let lines: Vec<f64> = crease.strips(end).collect();
-    let back = |[t, x]: Point| {
-        [crease.point[0] + t * along[0] + x * normal[0], crease.point[1] + t * along[1] + x * normal[1]]
-    };
     let mut pieces = Vec::new();
     let mut left = vec![polygon];
     // The direction of the sheet reverses at angles of π/2, 3π/2, … around the tube.
@@ -230,8 +243,8 @@ pub fn crease_outline(outline: &[Point], crease: &Crease) -> Result<Vec<Vec<Poin
         let mut later = Vec::new();
         for piece in &left {
             for part in clipped(piece, turn) {
-                let folded: Vec<Point> =
-                    divided(&part, &lines).iter().map(|&[t, s]| back([t, crease.bent(s)[0]])).collect();
+                let bent = divided(&part, &lines).into_iter().map(|[t, s]| [t, crease.bent(s)[0]]).collect::<Vec<_>>();
+                let folded: Vec<Point> = finely(&bent, longest).into_iter().map(|p| crease.point_at(p)).collect();
                 let area = moments(&folded).0;
                 if area > 0.0 {
                     pieces.push(folded);
@@ -245,6 +258,16 @@ pub fn crease_outline(outline: &[Point], crease: &Crease) -> Result<Vec<Vec<Poin
         left = later;
     }
     Ok(pieces)
+}
+
+/// Divides sides that are longer than `longest`.
+fn finely(polygon: &[Point], longest: f64) -> Vec<Point> {
+    let side = |(a, b): (Point, Point)| {
+        let parts = (libm::hypot(b[0] - a[0], b[1] - a[1]) / longest).ceil().clamp(1.0, MOST_PARTS);
+        let steps = std::iter::successors(Some(0.0), |k| Some(k + 1.0)).take_while(move |k| *k < parts);
+        steps.map(move |k| [0, 1].map(|axis| a[axis] + k / parts * (b[axis] - a[axis])))
+    };
+    sides(polygon).flat_map(side).collect()
 }
 
 /// Inserts a point wherever a side crosses one of the lines y = `lines`, which are in ascending order.
@@ -320,7 +343,8 @@ mod tests {
     use crate::testing::{angular, rng, wavy};
     use crate::{Cloth, ClothParams, PixelGrid};
 
-    const CREASE: Crease = Crease { point: [40.0, -10.0], direction_rad: 2.0, radius: 3.0, kind: FoldKind::Flap };
+    const CREASE: Crease =
+        Crease { point: [40.0, -10.0], direction_rad: 2.0, curvature: 0.0, radius: 3.0, kind: FoldKind::Flap };
 
     fn flat() -> Sheet {
         let mut sheet = Cloth::new(&ClothParams::default()).unwrap().crumple(&wavy(2.0, 0.1), &mut rng(5)).unwrap();
@@ -389,6 +413,24 @@ mod tests {
     }
 
     #[test]
+    fn a_curved_flap_lies_on_its_parabola_and_keeps_its_area() {
+        let crease = Crease { curvature: 0.01, radius: 1e-3, ..CREASE };
+        let outline: Vec<Point> = finely(&wavy(2.0, 0.1), 0.5).iter().map(|p| [30.0 + p[0], p[1] - 20.0]).collect();
+        let pieces = crease_outline(&outline, &crease).unwrap();
+        let area: f64 = pieces.iter().map(|p| moments(p).0).sum();
+        assert!((area / moments(&outline).0 - 1.0).abs() < 1e-3);
+        let points = || pieces.iter().flatten().map(|p| crease.sheared(*p));
+        assert!(points().all(|[_, s]| s < 1.1e-3));
+        // Both ends of the fold and its middle are on the parabola.
+        let on_line: Vec<f64> = points().filter(|[_, s]| s.abs() < 2e-3).map(|[t, _]| t).collect();
+        assert!(on_line.len() > 20 && on_line.iter().any(|t| *t < -10.0) && on_line.iter().any(|t| *t > 10.0));
+        for p in [[3.0, -4.0], [55.0, 1.0]] {
+            let back = crease.point_at(crease.sheared(p));
+            assert!((back[0] - p[0]).abs() < 1e-12 && (back[1] - p[1]).abs() < 1e-12);
+        }
+    }
+
+    #[test]
     fn a_crease_outside_the_sheet_changes_nothing() {
         let mut sheet = flat();
         let before = sheet.clone();
@@ -398,8 +440,13 @@ mod tests {
 
     #[test]
     fn the_silhouette_is_that_of_the_folded_sheet() {
-        for (direction_rad, kind) in [(2.0, FoldKind::Flap), (0.3, FoldKind::Roll { turns: 1 })] {
-            let crease = Crease { direction_rad, kind, ..CREASE };
+        for (direction_rad, curvature, kind) in [
+            (2.0, 0.0, FoldKind::Flap),
+            (0.3, 0.0, FoldKind::Roll { turns: 1 }),
+            (2.0, 0.008, FoldKind::Flap),
+            (0.3, -0.008, FoldKind::Roll { turns: 1 }),
+        ] {
+            let crease = Crease { direction_rad, curvature, kind, ..CREASE };
             let mut sheet = flat();
             let place = |&(v, _): &(u32, u32)| [sheet.vertices[v as usize][0], sheet.vertices[v as usize][1]];
             let rim: Vec<Point> = rim(&sheet.edges).iter().map(place).collect();
@@ -412,7 +459,9 @@ mod tests {
                 .map(|t| t.map(|v| sheet.vertices()[v as usize]).map(|v| [v[0], v[1]]))
                 .map(|[a, b, c]| crate::sheet::cross(a, b, c).abs() / 2.0)
                 .sum();
-            assert!((areas / shadow - 1.0).abs() < 1e-9, "{areas} {shadow}");
+            // Triangles of the sheet have straight sides.
+            let tolerance = if curvature == 0.0 { 1e-9 } else { 3e-3 };
+            assert!((areas / shadow - 1.0).abs() < tolerance, "{areas} {shadow}");
             // Pixels have a thickness exactly where a piece covers them.
             let mut image = vec![0.0_f32; 250 * 250];
             let grid = PixelGrid { origin: [-100.0, -150.0], pixel_size: 1.0 };
@@ -434,7 +483,7 @@ mod tests {
     fn a_concave_outline_is_split_into_pieces() {
         // Both arms of a U are beyond the line.
         let u = [[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [6.0, 9.0], [6.0, 3.0], [3.0, 3.0], [3.0, 9.0], [0.0, 9.0]];
-        let crease = Crease { point: [0.0, 5.0], direction_rad: 0.0, radius: 1e-6, kind: FoldKind::Flap };
+        let crease = Crease { point: [0.0, 5.0], direction_rad: 0.0, radius: 1e-6, ..CREASE };
         let pieces = crease_outline(&u, &crease).unwrap();
         let mut areas: Vec<f64> = pieces.iter().map(|p| moments(p).0).collect();
         areas.sort_by(f64::total_cmp);
@@ -453,6 +502,7 @@ mod tests {
             Crease { radius: 0.0, ..CREASE },
             Crease { radius: f64::NAN, ..CREASE },
             Crease { direction_rad: f64::INFINITY, ..CREASE },
+            Crease { curvature: f64::NAN, ..CREASE },
             Crease { point: [0.0, f64::NAN], ..CREASE },
             Crease { kind: FoldKind::Roll { turns: 0 }, ..CREASE },
         ] {

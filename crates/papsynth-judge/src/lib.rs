@@ -31,8 +31,8 @@ pub use judge::{
     Conclusion, Curve, FeatureSet, FieldComparison, Judge, JudgeParams, Percentiles, Report, Scalar, Test,
 };
 pub use measure::{
-    BareCytoplasm, Detail, Field, HISTOGRAM, HISTOGRAM_FROM, HISTOGRAM_STEP, Measurer, MeasurerParams, Named,
-    NucleiFrom, PROFILE, RADII_UM, Statistics, clark_evans, frequencies, ripley,
+    BareCytoplasm, CYTOPLASM_NAMES, Detail, Field, HISTOGRAM, HISTOGRAM_FROM, HISTOGRAM_STEP, Measurer, MeasurerParams,
+    Named, NucleiFrom, PROFILE, RADII_UM, Statistics, TEXTURE, clark_evans, frequencies, ripley,
 };
 pub use moments::{Descriptor, Moments, qq_slope};
 pub use nuclei::NucleiParams;

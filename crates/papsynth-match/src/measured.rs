@@ -187,12 +187,17 @@ pub(crate) fn measure_in(fields: &[FieldImage], pixel_um: f64, phase: &Phase) ->
     let of_fields: Vec<Vec<(Parameter, f64)>> = lights
         .iter()
         .map(|l| {
-            vec![
+            let mut values = vec![
                 (Parameter::Level, l.level),
                 (Parameter::FalloffX, l.across.max(0.0)),
                 (Parameter::FalloffY, l.down.max(0.0)),
                 (Parameter::Noise, noise_of(l)),
-            ]
+            ];
+            if extended {
+                let [across, down] = l.empty.correlation;
+                values.extend([(Parameter::NoiseCorrelationX, across), (Parameter::NoiseCorrelationY, down)]);
+            }
+            values
         })
         .collect();
     let relative: Vec<Vec<f32>> = lights.into_iter().map(|l| l.empty.relative).collect();

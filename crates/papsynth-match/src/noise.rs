@@ -273,7 +273,7 @@ fn is_long(band: &[f32], p: usize, width: usize) -> bool {
 }
 
 /// Blurs with a Gaussian; border pixels are the mirror.
-fn blur(image: &[f32], width: usize, sigma: f64) -> Vec<f32> {
+pub(crate) fn blur(image: &[f32], width: usize, sigma: f64) -> Vec<f32> {
     let reach = whole(3.0 * sigma) + 1;
     let mut kernel: Vec<f32> =
         (0..=reach).map(|i| single(libm::exp(-0.5 * (i * i) as f64 / (sigma * sigma)))).collect();

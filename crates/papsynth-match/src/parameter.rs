@@ -95,9 +95,9 @@ parameters! {
     /// Fraction of the noise variance that is the same in all images.
     Pattern: Simulated, All, Linear 0.0..0.8 "", "camera.prnu, camera.dsnu_e: part of the variance of noise";
     /// Correlation of noise with the next pixel of the row, in fused images.
-    NoiseCorrelationX: Measured, All, Linear 0.0..0.45 "", "focus.noise_correlation_x";
+    NoiseCorrelationX: Measured, Field, Linear 0.0..0.45 "", "focus.noise_correlation_x";
     /// Correlation of noise with the next pixel of the column, in fused images.
-    NoiseCorrelationY: Measured, All, Linear 0.0..0.45 "", "focus.noise_correlation_y";
+    NoiseCorrelationY: Measured, Field, Linear 0.0..0.45 "", "focus.noise_correlation_y";
     /// Pixel size; sought on request only.
     Pixel: Simulated, All, Logarithmic 0.15..0.75 "um", "field.pixel_um";
     /// Fraction of photon noise in the noise variance of the empty slide, without the fixed pattern.

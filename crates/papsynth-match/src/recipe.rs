@@ -71,8 +71,6 @@ impl Setting {
         let counts: f64 = base.cells.values().map(|mix| density(&mix.count, area)).sum();
         let [superficial, intermediate] = of_pair(base);
         let lesions: f64 = lesions(base).map(|mix| density(&mix.count, area)).sum();
-        let first = base.cells.values().next();
-        let of_cells = |f: fn(&CellMix) -> &Number| first.map_or(&Number::Fixed(1.0), f).clone();
         let (radius, outside) = match &base.layout {
             Layout::Clusters(Clusters { radius_um, outside, .. }) => (centre(radius_um), centre(outside)),
             _ => (30.0, 1.0),
@@ -109,9 +107,9 @@ impl Setting {
             (P::Cells, counts),
             (P::Superficial, superficial / (superficial + intermediate).max(1e-9)),
             (P::Lesion, lesions / counts.max(1e-9)),
-            (P::Size, centre(&of_cells(|mix| &mix.size))),
-            (P::SizeVariation, centre(&of_cells(|mix| &mix.size_variation))),
-            (P::NucleusSize, centre(&of_cells(|mix| &mix.nucleus_size))),
+            (P::Size, of_first(base, P::Size)),
+            (P::SizeVariation, of_first(base, P::SizeVariation)),
+            (P::NucleusSize, of_first(base, P::NucleusSize)),
             (P::ClusterRadius, radius),
             (P::Outside, outside),
             (P::Leukocytes, density(&debris.leukocytes.clusters, area)),
@@ -266,6 +264,15 @@ fn of_pair(recipe: &Recipe) -> [f64; 2] {
     PAIR.map(|class| recipe.cells.get(class).map_or(0.0, |mix| density(&mix.count, area)))
 }
 
+/// Returns a factor on sizes of the first class of cells.
+fn of_first(base: &Recipe, parameter: P) -> f64 {
+    base.cells.values().next().map_or(1.0, |mix| match parameter {
+        P::NucleusSize => centre(&mix.nucleus_size),
+        P::SizeVariation => centre(&mix.size_variation),
+        _ => centre(&mix.size),
+    })
+}
+
 fn base_area(base: &Recipe) -> f64 {
     let [w, h, p] = [&base.field.width_px, &base.field.height_px, &base.field.pixel_um].map(centre);
     w * h * p * p * 1e-6
@@ -283,9 +290,9 @@ fn camera(r: &mut Recipe, log_sd: f64, on: &impl Fn(P) -> bool, or_base: &impl F
     }
     /// Minimum fraction of photon noise and of read noise.
     const LEAST: f64 = 0.02;
-    /// Fraction of the variance of the pattern that does not depend on the light: fitted to the pattern that real
-    /// fields share on the empty slide and on cells.
-    const ADDITIVE: f64 = 1.0 / 3.0;
+    /// Fraction of the variance of the pattern that does not depend on the light: fitted to the noise in dark nuclei of
+    /// real fields.
+    const ADDITIVE: f64 = 0.08;
     /// Range of the full well in recipes, electrons.
     const WELL: [f64; 2] = [10.0, 1e7];
     let glare = centre(&r.camera.glare_subtracted);
@@ -335,14 +342,17 @@ fn cells(r: &mut Recipe, base: &Recipe, values: &Values, on: &impl Fn(P) -> bool
         } else {
             mix.count = per_mm2(&mix.count, area, scale);
         }
-        if on(P::Size) {
-            mix.size = number(or_base(P::Size));
-        }
-        if on(P::NucleusSize) {
-            mix.nucleus_size = number(or_base(P::NucleusSize));
-        }
-        if on(P::SizeVariation) {
-            mix.size_variation = number(or_base(P::SizeVariation));
+        // Classes keep their sizes relative to each other.
+        for (parameter, own, [low, high]) in [
+            (P::Size, &mut mix.size, [0.1, 10.0]),
+            (P::NucleusSize, &mut mix.nucleus_size, [0.1, 10.0]),
+            (P::SizeVariation, &mut mix.size_variation, [0.0, 5.0]),
+        ] {
+            if on(parameter) {
+                let before = of_first(base, parameter);
+                *own = if before > 0.0 { times(own, or_base(parameter) / before) } else { number(or_base(parameter)) };
+                *own = cut(own.clone(), low, high);
+            }
         }
     }
 }

@@ -3,6 +3,7 @@
 use papsynth_judge::number::{single, whole};
 use papsynth_judge::{Control, FeatureTable, Field, FieldImage, Statistics};
 
+use crate::bodies::bodies;
 use crate::error::Error;
 use crate::hues::{HUES, Hues, hues};
 use crate::noise;
@@ -151,6 +152,9 @@ impl Summary {
         for (name, value) in scalars(s) {
             all.put(name, value);
         }
+        for (name, value) in papsynth_judge::CYTOPLASM_NAMES.into_iter().zip(s.cytoplasm) {
+            all.put(name, value);
+        }
         for (i, power) in s.spectrum.iter().enumerate() {
             all.put(format!("log power, ring {i}"), *power);
         }
@@ -165,6 +169,9 @@ impl Summary {
         all.put("unevenness of the light, coarsely", coarse);
         control.check()?;
         for (name, value) in noise::counts(grey, width, single(empty)) {
+            all.put(name, value);
+        }
+        for (name, value) in bodies(grey, width, single(empty), &nuclei.places, sampler.pixel_um) {
             all.put(name, value);
         }
         all.put_objects("nuclei", nuclei, &NUCLEI);

@@ -36,10 +36,10 @@ const BANDS: [[f64; 2]; 8] =
 const SCALES: usize = 3;
 
 /// Number of measurements of a window.
-pub(super) const TEXTURE: usize = BANDS.len() + 2 * SCALES + SCALES - 1;
+pub const TEXTURE: usize = BANDS.len() + 2 * SCALES + SCALES - 1;
 
-/// Identifiers of the measurements of a window.
-pub(super) const NAMES: [&str; TEXTURE] = [
+/// Identifiers of the values of [`Statistics::cytoplasm`](super::Statistics::cytoplasm).
+pub const NAMES: [&str; TEXTURE] = [
     "cytoplasm power at 0.005-0.02 cycles/px",
     "cytoplasm power at 0.02-0.04 cycles/px",
     "cytoplasm power at 0.04-0.08 cycles/px",

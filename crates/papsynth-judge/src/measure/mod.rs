@@ -23,6 +23,7 @@ use maps::Maps;
 
 pub use bare_cytoplasm::BareCytoplasm;
 pub use cell::PROFILE;
+pub use cytoplasm::{NAMES as CYTOPLASM_NAMES, TEXTURE};
 pub(crate) use patch::PATCH_PX;
 pub use statistics::{
     HISTOGRAM, HISTOGRAM_FROM, HISTOGRAM_STEP, Named, RADII_UM, Statistics, clark_evans, frequencies, ripley,

@@ -774,6 +774,9 @@ class Folds(Section):
     depth: Number | None = None
     """Distance of the crease of a flap from the rim, as a fraction of the radius of the cell. From 0.02 to 0.9."""
 
+    curvature: Number | None = None
+    """Curvature of a crease times the radius of the cell, bent to either side: 0 is a straight line. From 0 to 2."""
+
     radius_um: Number | None = None
     """Bending radius of a fold. From 0.1 to 5 µm."""
 

@@ -6,7 +6,7 @@ section! {
     /// Air bubbles in the mountant.
     pub struct Bubbles, drawn from rng as pub Bubble {
         /// Number of bubbles; drawn once per field.
-        count: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(0.16, 0.9)), 0..=10000, "per field or per mm²";
+        count: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(0.06, 0.9)), 0..=10000, "per field or per mm²";
         /// Radius.
         radius_um: Number = Number::log_normal(22.0, 0.45), 1..=250, "µm";
         /// Width of the dark rim relative to the radius.

@@ -7,7 +7,7 @@ section! {
     /// Dust on the cover glass or in the mountant.
     pub struct Dust, drawn from rng as pub Grain {
         /// Number of grains; drawn once per field.
-        count: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(0.45, 0.9)), 0..=100000, "per field or per mm²";
+        count: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(0.2, 0.9)), 0..=100000, "per field or per mm²";
         /// Diameter.
         diameter_um: Number = Number::log_normal(14.0, 0.5), 0.5..=200, "µm";
         /// Height above the cells: 170 is the outer face of a cover glass, smaller values are in the mountant.

@@ -6,7 +6,7 @@ section! {
     /// Textile fibres in the mountant or on the glass.
     pub struct Fibres, drawn from rng as pub Fibre {
         /// Number of fibres; drawn once per field.
-        count: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(0.18, 0.8)), 0..=10000, "per field or per mm²";
+        count: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(0.06, 0.8)), 0..=10000, "per field or per mm²";
         /// Length.
         length_um: Number = Number::uniform(60.0, 200.0), 5..=500, "µm";
         /// Width.

@@ -342,7 +342,7 @@ fn object_octaves(statistics: &Statistics, noise: f64, blur_px: f64, white: &[f6
     /// Smallest part of the measured variance that is texture.
     const LEAST: f64 = 0.05;
     /// Smallest modulation transfer whose loss is compensated.
-    const TRANSFER: f64 = 0.3;
+    const TRANSFER: f64 = 0.2;
     let blur = if blur_px.is_finite() { blur_px } else { 0.0 };
     let object = |(octave, (measured, white)): (usize, (f64, &f64))| {
         // Centre of the octave, cycles per pixel.

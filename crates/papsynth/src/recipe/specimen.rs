@@ -255,6 +255,8 @@ section! {
         folded_over: Number = 0.02, 0..=1;
         /// Distance of the crease of a flap from the rim, as a fraction of the radius of the cell.
         depth: Number = Number::uniform(0.10, 0.50), 0.02..=0.9;
+        /// Curvature of a crease times the radius of the cell, bent to either side: 0 is a straight line.
+        curvature: Number = Number::uniform(0.10, 0.60), 0..=2;
         /// Bending radius of a fold.
         radius_um: Number = Number::uniform(0.35, 0.8), 0.1..=5, "µm";
     }
@@ -278,21 +280,21 @@ section! {
         /// Number of protrusions of the rim.
         protrusions: Number (given usize) = Number::uniform(0.0, 9.0), 0..=20;
         /// Number of wrinkles: narrow folds of double thickness.
-        wrinkles: Number (given usize) = Number::log_normal(7.0, 0.6), 0..=100;
+        wrinkles: Number (given usize) = Number::log_normal(10.0, 0.6).at_most(60.0), 0..=100;
         /// Additional thickness at the crest of a wrinkle, relative to the flat sheet.
-        wrinkle_thickness: Number (given f64) = Number::log_normal(0.42, 0.42), 0..=5;
+        wrinkle_thickness: Number (given f64) = Number::log_normal(0.34, 0.42), 0..=5;
         /// Width of a wrinkle: standard deviation of its profile.
-        wrinkle_um: Number (given f64) = Number::uniform(0.18, 0.5), 0.05..=5, "µm";
+        wrinkle_um: Number (given f64) = Number::uniform(0.3, 1.3), 0.05..=5, "µm";
         /// Additional density and granularity of the cytoplasm around the nucleus, relative to the rest.
         endoplasm: Number (given f64) = Number::log_normal(0.08, 0.6), 0..=2;
         /// Amplitude of the first level of detail, low-frequency Gaussian noise, relative to the absorbance of the
         /// cytoplasm.
-        clouds: Number = Number::uniform(0.08, 0.28), 0..=2;
+        clouds: Number = Number::uniform(0.05, 0.18), 0..=2;
         /// Standard deviation of the smoothing of that noise.
         clouds_um: Number = Number::uniform(3.0, 14.0), 0.1..=100, "µm";
         /// Amplitude of the second level of detail, relative to the absorbance of the cytoplasm: spots, made by
         /// thresholding Brownian noise.
-        flecks: Number = Number::log_normal(0.04, 0.5).at_least(0.0).at_most(0.5), 0..=5;
+        flecks: Number = Number::log_normal(0.02, 0.5).at_least(0.0).at_most(0.5), 0..=5;
         /// Quantile of the Brownian noise at which it is thresholded: the fraction of the cell without spots.
         flecks_threshold: Number = Number::uniform(0.55, 0.85), 0..=0.999;
         /// Amplitude of the third level of detail, the cytoskeleton, relative to the absorbance of the cytoplasm.

@@ -65,6 +65,8 @@ pub struct Fold {
     pub direction_deg: f64,
     /// Distance of the crease from the rim, as a fraction of the radius.
     pub depth: f64,
+    /// Curvature of the crease times the radius of the cell; a positive one bends towards the rim.
+    pub curvature: f64,
     /// Bending radius, µm.
     pub radius_um: f64,
 }

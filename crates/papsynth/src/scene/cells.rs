@@ -351,6 +351,8 @@ fn draw_fold(recipe: &Recipe, pliability: f64, rng: &mut Stream) -> Option<Fold>
     let direction_deg = random::between(0.0, 360.0, rng);
     let depth = folds.depth.draw(rng);
     let radius_um = folds.radius_um.draw(rng);
+    let side = if random::chance(0.5, rng) { -1.0 } else { 1.0 };
+    let curvature = side * folds.curvature.draw(rng);
     let form = if which < folded_over {
         FoldForm::FoldedOver
     } else if which < folded_over + roll {
@@ -369,5 +371,5 @@ fn draw_fold(recipe: &Recipe, pliability: f64, rng: &mut Stream) -> Option<Fold>
         FoldForm::Roll => depth * ROLLED,
         FoldForm::FoldedOver => FOLDED_OVER,
     };
-    Some(Fold { form, direction_deg, depth, radius_um })
+    Some(Fold { form, direction_deg, depth, curvature, radius_um })
 }

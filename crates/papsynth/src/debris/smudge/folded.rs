@@ -65,6 +65,7 @@ pub(super) fn draw(smudge: &Smudge, context: &ObjectContext<'_>, rng: &mut Strea
         let crease = Crease {
             point: [at * normal[0], at * normal[1]],
             direction_rad: direction - core::f64::consts::FRAC_PI_2,
+            curvature: 0.0,
             radius: CREASE_UM,
             kind: FoldKind::Flap,
         };

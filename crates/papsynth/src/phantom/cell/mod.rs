@@ -93,6 +93,7 @@ fn creases(cell: &CellContext<'_>, fold: Fold, outline: &[Point], centre: Point)
             point: [centre[0] + at * normal[0], centre[1] + at * normal[1]],
             // The crease is perpendicular to the direction of the fold.
             direction_rad: direction - core::f64::consts::FRAC_PI_2,
+            curvature: fold.curvature / radius,
             radius: fold.radius_um / pixel_um,
             kind,
         }

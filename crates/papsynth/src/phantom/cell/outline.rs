@@ -152,8 +152,9 @@ pub(super) fn roughened(outline: &[Point], depth_px: f64, step_px: f64, rng: &mu
     }
     let count = random::count(fsd_shape::perimeter(outline) / step_px).max(outline.len());
     let fine = fsd_shape::resample_along(outline, count);
-    // First-order autoregressions: the slow one modulates the amplitude of the fast one along the rim.
-    let (mut slow, mut fast, mut medium) = (random::normal(rng), random::normal(rng), random::normal(rng));
+    // First-order autoregressions: the slow ones modulate the amplitudes of the others, so that parts of a rim are
+    // smooth and others frayed.
+    let [mut slow, mut fast, mut medium, mut slow_of_medium] = [(); 4].map(|()| random::normal(rng));
     let step = |state: f64, memory: f64, rng: &mut Stream| {
         memory * state + (1.0 - memory * memory).sqrt() * random::normal(rng)
     };
@@ -162,10 +163,11 @@ pub(super) fn roughened(outline: &[Point], depth_px: f64, step_px: f64, rng: &mu
             slow = step(slow, 0.985, rng);
             fast = step(fast, 0.6, rng);
             medium = step(medium, 0.88, rng);
+            slow_of_medium = step(slow_of_medium, 0.985, rng);
             let [before, here, after] = [fine[(i + count - 1) % count], fine[i], fine[(i + 1) % count]];
             let (tx, ty) = (after[0] - before[0], after[1] - before[1]);
             let length = (tx * tx + ty * ty).sqrt().max(1e-9);
-            let frayed = fast * (0.35 + slow.max(0.0)) + MEDIUM_SCALE * medium;
+            let frayed = fast * (0.35 + slow.max(0.0)) + MEDIUM_SCALE * medium * (0.3 + slow_of_medium.max(0.0));
             let push = (0.5 * depth_px * frayed).clamp(-2.5 * depth_px, 2.5 * depth_px);
             [here[0] + push * ty / length, here[1] - push * tx / length]
         })
