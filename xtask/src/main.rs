@@ -22,6 +22,7 @@ mod supply;
 mod test;
 mod vectors;
 mod workspace;
+mod worth;
 
 use std::process::ExitCode;
 
@@ -92,6 +93,7 @@ enum DevCommand {
         #[arg(long)]
         quick: bool,
     },
+    Worth(worth::Worth),
     /// Lists the items that cite each equation of the paper, and fails if an equation is not cited
     ///
     /// Reads the documentation of every item in crates/*/src: "Eq. 4", "Eqs. 1, 2", "Eqs. 8 to 10". Comments cite the
@@ -206,6 +208,7 @@ fn run(command: DevCommand) -> Result<()> {
         DevCommand::Bench(arguments) => bench::run(workspace, arguments),
         DevCommand::Figures { wanted } => figures::run(workspace, &wanted),
         DevCommand::Realism { quick } => realism::run(workspace, quick),
+        DevCommand::Worth(options) => worth::run(workspace, &options),
         DevCommand::Equations => equations::run(workspace),
         DevCommand::Prose => prose::run(workspace),
         DevCommand::Vectors => vectors::run(workspace),

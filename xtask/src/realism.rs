@@ -11,7 +11,7 @@ use crate::workspace::Workspace;
 use crate::{dataset, python};
 
 /// Pixel size of the real fields, µm.
-const PIXEL_UM: &str = "0.33";
+pub(crate) const PIXEL_UM: &str = "0.33";
 
 /// Number of fields generated for each comparison.
 const FRAMES: &str = "16";
@@ -23,7 +23,7 @@ const FEATURES: [&str; 2] = ["1", "2"];
 const FOREST: &str = "numpy\npillow\npycocotools\nscikit-learn\nscipy\n";
 
 /// Grades of the real fields: code, name and preset.
-const GRADES: [(&str, &str, &str); 3] =
+pub(crate) const GRADES: [(&str, &str, &str); 3] =
     [("N", "negative", "extended-focus"), ("L", "low-grade lesion", "lsil"), ("H", "high-grade lesion", "high-grade")];
 
 pub(crate) fn run(workspace: &Workspace, quick: bool) -> Result<()> {
@@ -83,14 +83,15 @@ pub(crate) fn run(workspace: &Workspace, quick: bool) -> Result<()> {
     Ok(())
 }
 
-fn program(workspace: &Workspace) -> Command {
+/// Returns the program in release mode.
+pub(crate) fn program(workspace: &Workspace) -> Command {
     let mut command = workspace.cargo();
     command.args(["run", "--release", "--package", "papsynth-cli", "--"]);
     command
 }
 
 /// Writes two folders, each with every second field of each grade and its annotations.
-fn halves(fields: &Path, folder: &Path) -> Result<[PathBuf; 2]> {
+pub(crate) fn halves(fields: &Path, folder: &Path) -> Result<[PathBuf; 2]> {
     let text = shell::read(&fields.join("frames.csv"))?;
     let halves = ["fit", "judge"].map(|name| folder.join(name));
     for (which, half) in halves.iter().enumerate() {

@@ -68,6 +68,9 @@ impl RecipeFile {
         if let Some(camera) = args.camera {
             base.camera = camera.camera();
         }
+        if let Some(factor) = args.widen {
+            base = base.widened(factor);
+        }
         let sources = Sources { file, sets };
         let recipe = sources
             .overlay(base)
@@ -260,7 +263,7 @@ mod tests {
 
     fn load(preset: Preset, sets: &[&str]) -> Result<Recipe, String> {
         let set = sets.iter().map(|&s| s.to_owned()).collect();
-        let args = RecipeArgs { recipe: None, preset: Some(preset), with: Vec::new(), camera: None, set };
+        let args = RecipeArgs { recipe: None, preset: Some(preset), with: Vec::new(), camera: None, widen: None, set };
         RecipeFile::load(&args).map(|found| found.recipe).map_err(|error| error.json().to_string())
     }
 

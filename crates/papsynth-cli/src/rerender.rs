@@ -81,6 +81,7 @@ fn load(args: &Rerender, seed: u64, changed: bool) -> Result<Setup, ExitError> {
             preset: None,
             with: if changed { args.with.clone() } else { Vec::new() },
             camera: args.camera.filter(|_| changed),
+            widen: None,
             set: if changed { args.set.clone() } else { Vec::new() },
         },
         model: Some(args.dir.join("model.json")),

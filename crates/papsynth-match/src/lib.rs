@@ -1,7 +1,6 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
-mod bodies;
 mod compare;
 mod distance;
 mod error;
@@ -9,6 +8,7 @@ mod fit;
 mod hues;
 mod measured;
 mod noise;
+mod objects;
 mod parameter;
 mod posterior;
 mod recipe;

@@ -1,4 +1,4 @@
-//! Noise as a function of darkness, unevenness of the light, and counts of small objects.
+//! Noise as a function of darkness, and unevenness of the light.
 
 use crate::error::Error;
 use papsynth_judge::Control;
@@ -198,80 +198,6 @@ pub(crate) fn pattern(fields: &[Vec<f32>], control: &Control) -> Result<Option<[
     Ok((pairs > 0).then(|| [mean(&products), sd / (fields.len().min(pairs) as f64).sqrt()]))
 }
 
-/// Scales of small objects, pixels.
-const SCALES: [f64; 3] = [1.0, 2.0, 4.0];
-
-/// Minimum contrast of small objects after a difference of Gaussians, absorbance.
-const DARKNESS: [f32; 3] = [0.006, 0.02, 0.06];
-
-/// Maximum absorbance of empty surroundings, after a wide Gaussian.
-const EMPTY_AROUND: f32 = 0.025;
-
-/// Standard deviation of the Gaussian of the surroundings, pixels.
-const AROUND_PX: f64 = 10.0;
-
-/// Minimum ratio of the curvatures of an elongated object.
-const LONG: f32 = 2.5;
-
-/// Minimum light, relative to the empty slide.
-const LEAST_LIGHT: f32 = 0.004;
-
-/// Returns logarithms of the number of small objects per 1000 pixels, and the fraction of elongated ones; `empty` is
-/// the level of the empty slide.
-pub(crate) fn counts(grey: &[f32], width: usize, empty: f32) -> Vec<(String, f64)> {
-    let height = grey.len() / width;
-    let absorbance: Vec<f32> = grey.iter().map(|g| -libm::log10f((g / empty).max(LEAST_LIGHT))).collect();
-    let around = blur(&absorbance, width, AROUND_PX);
-    let mut out = Vec::new();
-    for scale in SCALES {
-        let fine = blur(&absorbance, width, scale);
-        let coarse = blur(&absorbance, width, 1.6 * scale);
-        let band: Vec<f32> = fine.iter().zip(&coarse).map(|(a, b)| a - b).collect();
-        let mut found = [[0_u32; DARKNESS.len()]; 2];
-        let mut long = [0_u32; 2];
-        for y in 1..height.saturating_sub(1) {
-            for x in 1..width - 1 {
-                let p = y * width + x;
-                let own = band[p];
-                if own < DARKNESS[0] {
-                    continue;
-                }
-                let before = [p - width - 1, p - width, p - width + 1, p - 1];
-                let after = [p + 1, p + width - 1, p + width, p + width + 1];
-                if before.iter().any(|q| band[*q] >= own) || after.iter().any(|q| band[*q] > own) {
-                    continue;
-                }
-                let place = usize::from(around[p] > EMPTY_AROUND);
-                for (count, level) in found[place].iter_mut().zip(DARKNESS) {
-                    *count += u32::from(own >= level);
-                }
-                long[place] += u32::from(is_long(&band, p, width));
-            }
-        }
-        let thousands = grey.len() as f64 / 1000.0;
-        for ((found, long), place) in found.into_iter().zip(long).zip(["on empty slide", "on cells"]) {
-            out.extend(found.into_iter().zip(DARKNESS).map(|(count, level)| {
-                let name = format!("objects of {scale} px above {level} {place}");
-                (name, libm::log(f64::from(count) / thousands + 0.01))
-            }));
-            let fraction = if found[0] >= 5 { f64::from(long) / f64::from(found[0]) } else { f64::NAN };
-            out.push((format!("elongated objects of {scale} px {place}"), fraction));
-        }
-    }
-    out
-}
-
-/// Returns whether a maximum is elongated.
-fn is_long(band: &[f32], p: usize, width: usize) -> bool {
-    let at = |q: usize| band[q];
-    let xx = 2.0 * at(p) - at(p - 1) - at(p + 1);
-    let yy = 2.0 * at(p) - at(p - width) - at(p + width);
-    let xy = 0.25 * (at(p + width - 1) + at(p - width + 1) - at(p + width + 1) - at(p - width - 1));
-    let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
-    let root = (half * half + xy * xy).sqrt();
-    mean + root > LONG * (mean - root).max(0.0)
-}
-
 /// Blurs with a Gaussian; border pixels are the mirror.
 pub(crate) fn blur(image: &[f32], width: usize, sigma: f64) -> Vec<f32> {
     let reach = whole(3.0 * sigma) + 1;
@@ -359,22 +285,5 @@ mod tests {
         let variance: f64 = out.iter().enumerate().map(|(i, v)| f64::from(*v) * off(i) * off(i)).sum();
         assert!((variance - 4.0).abs() < 0.1, "{variance}");
         assert!(blur(&vec![3.0; 400], 20, 10.0).iter().all(|v| (v - 3.0).abs() < 1e-5));
-    }
-
-    #[test]
-    fn dots_and_rods_are_counted_separately() {
-        let width = 100;
-        let mut grey = vec![200.0; width * width];
-        for k in 0..5 {
-            grey[(10 + 18 * k) * width + 20] = 60.0;
-            for x in 60..70 {
-                grey[(10 + 18 * k) * width + x] = 100.0;
-            }
-        }
-        let found = counts(&grey, width, 200.0);
-        assert_eq!(found.len(), 24);
-        let things = (libm::exp(found[0].1) - 0.01) * 10.0;
-        assert!((9.5..20.5).contains(&things), "{things}");
-        assert!((0.2..0.8).contains(&found[3].1), "{:?}", found[3]);
     }
 }

@@ -3,10 +3,10 @@
 use papsynth_judge::number::{single, whole};
 use papsynth_judge::{Control, FeatureTable, Field, FieldImage, Statistics};
 
-use crate::bodies::bodies;
 use crate::error::Error;
 use crate::hues::{HUES, Hues, hues};
 use crate::noise;
+use crate::objects;
 use crate::sampler::Sampler;
 use portable_numerics::statistics::{mean, quantile};
 
@@ -168,10 +168,10 @@ impl Summary {
         all.put("unevenness of the light, finely", fine);
         all.put("unevenness of the light, coarsely", coarse);
         control.check()?;
-        for (name, value) in noise::counts(grey, width, single(empty)) {
+        for (name, value) in objects::counts(grey, width, single(empty)) {
             all.put(name, value);
         }
-        for (name, value) in bodies(grey, width, single(empty), &nuclei.places, sampler.pixel_um) {
+        for (name, value) in objects::bodies(grey, width, single(empty), &nuclei.places, sampler.pixel_um) {
             all.put(name, value);
         }
         all.put_objects("nuclei", nuclei, &NUCLEI);

@@ -298,12 +298,15 @@ pub(crate) fn recipe_schema() -> String {
 
 /// Returns a complete recipe as TOML.
 #[pyfunction]
-#[pyo3(signature = (recipe=None))]
-pub(crate) fn resolve(py: Python<'_>, recipe: Option<&Bound<'_, PyAny>>) -> PyResult<String> {
+#[pyo3(signature = (recipe=None, widen=1.0))]
+pub(crate) fn resolve(py: Python<'_>, recipe: Option<&Bound<'_, PyAny>>, widen: f64) -> PyResult<String> {
+    if !(1.0..=5.0).contains(&widen) {
+        return Err(wrong(format!("widen: {widen} is out of range: expected 1 to 5")));
+    }
     let source = Source::read(py, recipe)?;
     let problems = source.recipe.problems();
     if problems.is_empty() {
-        return Ok(source.recipe.to_toml());
+        return Ok(source.recipe.widened(widen).to_toml());
     }
     Err(error::engine(py, &source.name, &papsynth::Error::Recipe(problems)))
 }

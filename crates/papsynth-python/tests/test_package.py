@@ -305,6 +305,15 @@ def test_recipes_are_completed_and_have_a_schema():
     assert json.dumps(papsynth.schema())
 
 
+def test_a_recipe_is_widened_for_training():
+    wide = papsynth.recipe(SMALL, widen=2.0)
+    assert papsynth.recipe(SMALL, widen=1.0) == papsynth.recipe(SMALL)
+    assert wide["stain"]["field_nucleus"]["log_normal"][1] > papsynth.recipe(SMALL)["stain"]["field_nucleus"]["log_normal"][1]
+    assert papsynth.render(wide, seed=2).image.shape == (240, 320)
+    with pytest.raises(ValueError, match="widen: 0.5 is out of range: expected 1 to 5"):
+        papsynth.recipe(SMALL, widen=0.5)
+
+
 def test_techniques_work_and_reject_invalid_arguments():
     angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
     circle = np.stack([50 + 40 * np.cos(angle), 50 + 30 * np.sin(angle)], axis=1)

@@ -7,7 +7,7 @@ use clap::Args;
 use papsynth::recipe::{CameraPreset, Preset};
 use papsynth_dataset::{Extra, Flatten, Format, Layout};
 
-use super::values::{camera_parser, extra_parser, format_parser, integer, named, preset_parser};
+use super::values::{camera_parser, extra_parser, format_parser, integer, named, number, preset_parser};
 use crate::exit;
 use crate::words::counted;
 
@@ -26,6 +26,10 @@ pub(crate) struct RecipeArgs {
     /// Built-in camera that replaces the camera of the recipe
     #[arg(long, value_name = "NAME", value_parser = camera_parser())]
     pub(crate) camera: Option<CameraPreset>,
+    /// Widen the distributions of stain, focus, light, noise, texture, debris and crowding by this factor, for
+    /// training; 1.5 adds half of the spread between real slides
+    #[arg(long, value_name = "FACTOR", value_parser = number(1.0, 5.0))]
+    pub(crate) widen: Option<f64>,
     /// Set one parameter of the recipe; repeatable, the last value counts
     #[arg(long, value_name = "KEY=VALUE", allow_hyphen_values = true)]
     pub(crate) set: Vec<String>,

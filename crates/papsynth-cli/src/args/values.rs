@@ -67,6 +67,14 @@ where
     }
 }
 
+/// Parses numbers of a range, both ends included.
+pub(super) fn number(low: f64, high: f64) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text| match text.parse() {
+        Ok(value) if low <= value && value <= high => Ok(value),
+        _ => Err(format!("expected a number from {low} to {high}")),
+    }
+}
+
 /// Parses `A..B`, B excluded.
 pub(super) fn parse_range(text: &str) -> Result<Range<u64>, String> {
     let expected = || "expected A..B with integers A < B, for example 0..100".to_owned();
@@ -105,6 +113,15 @@ mod tests {
         assert_eq!(parse("1024"), Ok(1024));
         for bad in ["0", "1025", "-1", "1.5", "", "x"] {
             assert_eq!(parse(bad), Err("expected an integer from 1 to 1024".to_owned()), "{bad}");
+        }
+    }
+
+    #[test]
+    fn numbers_outside_the_range_name_the_range() {
+        let parse = number(1.0, 5.0);
+        assert_eq!(parse("1.5"), Ok(1.5));
+        for bad in ["0.9", "5.1", "nan", "inf", "", "x"] {
+            assert_eq!(parse(bad), Err("expected a number from 1 to 5".to_owned()), "{bad}");
         }
     }
 

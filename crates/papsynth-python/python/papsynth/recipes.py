@@ -941,9 +941,7 @@ class Leukocytes(Section):
     """
 
     remains: Number | None = None
-    """Probability that granular remains and shreds of mucus stick to a lobed leukocyte. They belong to its mask. From 0 to
-    1.
-    """
+    """Probability that granular remains stick to a lobed leukocyte. They belong to its mask. From 0 to 1."""
 
     absorbance: Number | None = None
     """Absorbance of the nucleus, before the nuclear stain factor of the field. From 0 to 4."""
@@ -1077,6 +1075,11 @@ class Nucleus(Section):
     edge_um: Number | None = None
     """Softness of the edge of a nucleus: standard deviation of the falloff of its thickness at the outline. From 0 to 3
     µm.
+    """
+
+    displacement: Number | None = None
+    """Fraction of the cytoplasm of a cell that its nucleus displaces. The mean contrast of nuclei does not depend on it,
+    but nuclei in thick cytoplasm are fainter. From 0 to 1.
     """
 
 

@@ -1,6 +1,7 @@
 //! Bare nuclei: nuclei of intermediate cells without cytoplasm except for faint shreds.
 
 use super::prelude::*;
+use super::tuft::Tuft;
 
 section! {
     /// Bare nuclei: nuclei of intermediate cells after lysis by bacteria.
@@ -51,8 +52,15 @@ const EDGE_STEPS: u8 = 4;
 /// Size (standard deviation) of clumps of chromatin, µm.
 const CLUMP_UM: f64 = 0.35;
 
-/// Number of shreds of cytoplasm.
-const SHREDS: usize = 7;
+/// Distance of the centre of the shreds from that of the nucleus, in its radii: minimum, maximum.
+const AWAY: [f64; 2] = [0.0, 0.7];
+/// Half length of the shreds in radii of the nucleus: minimum, maximum.
+const LENGTH: [f64; 2] = [1.1, 1.6];
+/// Width of the shreds relative to their length: minimum, maximum.
+const WIDTH: [f64; 2] = [0.6, 1.0];
+/// Size of the grains of the shreds, µm, and their contrast.
+const GRAIN_UM: f64 = 0.9;
+const GRANULARITY: f64 = 0.25;
 
 impl BareNucleus {
     pub(super) fn reach_um(&self, _pixel_um: f64) -> f64 {
@@ -88,14 +96,19 @@ impl BareNucleus {
         let sampler = FieldSampler::clouds(context.px(CLUMP_UM), &mut rng);
         nucleus.texture(context.noise_fields.clouds(), &sampler, self.texture as f32);
         let mut shreds = nucleus.blank();
-        for _ in 0..SHREDS {
-            let (angle, reach) = (random::direction(&mut rng), self.radius_um * random::between(1.0, 1.8, &mut rng));
-            let ends = [0.7 * self.radius_um, reach];
-            let bend = angle + 0.3 * random::normal(&mut rng);
-            let ends = ends.map(|r| context.to_grid([r * libm::cos(bend), r * libm::sin(angle)]));
-            let half_width = context.px(self.radius_um * random::between(0.12, 0.45, &mut rng));
-            shreds.stroke(&Stroke { ends, half_widths: [half_width, 0.4 * half_width] }, self.shreds);
+        let side = random::direction(&mut rng);
+        let away = self.radius_um * random::between(AWAY[0], AWAY[1], &mut rng);
+        let length = self.radius_um * random::between(LENGTH[0], LENGTH[1], &mut rng);
+        Tuft {
+            centre: context.to_grid([away * libm::cos(side), away * libm::sin(side)]),
+            half: [context.px(length), context.px(length * random::between(WIDTH[0], WIDTH[1], &mut rng))],
+            turn: random::direction(&mut rng),
+            grain: context.px(GRAIN_UM),
+            granularity: GRANULARITY,
+            ragged: 1.0,
+            absorbance: self.shreds,
         }
+        .draw(&mut shreds, context, &mut rng);
         nucleus.into_phantom(context.dyes.nucleus, 0.0, self.absorbance).with_inclusion(shreds.absorbance, self.dyes)
     }
 }

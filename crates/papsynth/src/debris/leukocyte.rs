@@ -61,7 +61,7 @@ section! {
         pyknotic: Number = 0.4, 0..=1;
         /// Fraction of the lobed leukocytes that are histiocytes, which are larger and have a kidney-shaped nucleus.
         histiocytes: Number = 0.04, 0..=1;
-        /// Probability that granular remains and shreds of mucus stick to a lobed leukocyte. They belong to its mask.
+        /// Probability that granular remains stick to a lobed leukocyte. They belong to its mask.
         remains: Number = 0.3, 0..=1;
         /// Absorbance of the nucleus, before the nuclear stain factor of the field.
         absorbance: Number = Number::normal(0.26, 0.042).at_least(0.1), 0..=4;
@@ -94,7 +94,7 @@ pub struct Leukocyte {
     pub degenerated: bool,
     /// Whether the nucleus is small and dark, without structure.
     pub pyknotic: bool,
-    /// Whether granular remains and shreds of mucus stick to the leukocyte.
+    /// Whether granular remains stick to the leukocyte.
     pub remains: bool,
     /// Amounts of dye of the cytoplasm where the absorbance is 1.
     pub dyes: dye_spectra::Amounts,

@@ -25,7 +25,7 @@ section! {
         /// Grain size.
         grain_um: Number = Number::uniform(0.6, 1.1), 0.2..=5, "µm";
         /// Contrast of the grains relative to the absorbance.
-        granularity: Number = Number::uniform(0.25, 0.6), 0..=2;
+        granularity: Number = Number::uniform(0.15, 0.4), 0..=2;
         /// Irregularity of the outline: 0 is an ellipse.
         ragged: Number = Number::uniform(0.7, 1.4), 0..=2;
         /// Absorbance.

@@ -39,6 +39,10 @@ const FADE: f32 = 0.6;
 /// debris are about as soft as those of leukocytes.
 const EDGE: f32 = 0.1;
 
+/// Sizes relative to the grain size, and strengths, of the noise fields of the grains: debris has grains and larger,
+/// uneven patches. The sum has a standard deviation of 1.
+const GRAINS: [(f64, f32); 2] = [(1.0, 0.7), (2.7, 0.714)];
+
 /// Standard deviation of the noise field relative to the grain size.
 const GRAIN_SIGMA: f64 = 0.42;
 
@@ -78,15 +82,23 @@ impl Tuft {
         let sharpness = radius as f32;
         let grainy_edge = (self.ragged * (GRAINY_EDGE * self.grain / radius).min(MAX_GRAINY_EDGE)) as f32;
         let (absorbance, granularity) = (self.absorbance as f32, self.granularity as f32);
-        let grains = FieldSampler::clouds(GRAIN_SIGMA * self.grain, rng);
-        canvas.rows(context.noise_fields.clouds(), &grains, |_, covers, values, field| {
-            for ((cover, value), grain) in covers.iter_mut().zip(values).zip(field) {
-                let inside = *value + grainy_edge * grain;
-                *cover = (inside * sharpness + 0.5).clamp(0.0, 1.0);
-                let fade = (EDGE + (1.0 - EDGE) * (inside / FADE).clamp(0.0, 1.0)) * *cover;
-                *value = absorbance * fade * (1.0 + granularity * grain).max(0.0);
-            }
-        });
+        let mut structure = vec![0.0; canvas.absorbance.values.len()];
+        for (size, strength) in GRAINS {
+            let sampler = FieldSampler::clouds(size * GRAIN_SIGMA * self.grain, rng);
+            let mut rest = structure.as_mut_slice();
+            canvas.rows(context.noise_fields.clouds(), &sampler, |_, _, values, field| {
+                let (row, later) = core::mem::take(&mut rest).split_at_mut(values.len());
+                row.iter_mut().zip(field).for_each(|(sum, field)| *sum += strength * field);
+                rest = later;
+            });
+        }
+        let values = canvas.absorbance.values.iter_mut().zip(&mut canvas.coverage.values);
+        for ((value, cover), grain) in values.zip(&structure) {
+            let inside = *value + grainy_edge * grain;
+            *cover = (inside * sharpness + 0.5).clamp(0.0, 1.0);
+            let fade = (EDGE + (1.0 - EDGE) * (inside / FADE).clamp(0.0, 1.0)) * *cover;
+            *value = absorbance * fade * (1.0 + granularity * grain).max(0.0);
+        }
     }
 }
 

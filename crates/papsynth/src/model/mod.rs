@@ -147,11 +147,15 @@ pub struct OutlineForm {
     /// Factor on all other descriptors of the outline, 0 (a smooth oval) to 3.
     #[serde(skip_serializing_if = "is_one")]
     pub unevenness: f64,
+    /// Spread of a factor on all descriptors but the radius, as the standard deviation of its logarithm, 0 to 1: some
+    /// outlines are rounder and some more uneven than a normal distribution gives. The learned variances stay.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub variation: f64,
 }
 
 impl Default for OutlineForm {
     fn default() -> Self {
-        Self { elongation: None, taper: 0.0, unevenness: 1.0 }
+        Self { elongation: None, taper: 0.0, unevenness: 1.0, variation: 0.0 }
     }
 }
 
@@ -165,7 +169,8 @@ impl OutlineForm {
             elongation.check(&format!("{path}.elongation"), 0.0, 0.9)?;
         }
         within(&format!("{path}.taper"), self.taper, [-0.3, 0.3])?;
-        within(&format!("{path}.unevenness"), self.unevenness, [0.0, 3.0])
+        within(&format!("{path}.unevenness"), self.unevenness, [0.0, 3.0])?;
+        within(&format!("{path}.variation"), self.variation, [0.0, 1.0])
     }
 }
 

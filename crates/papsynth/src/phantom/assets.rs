@@ -138,9 +138,12 @@ const MAX_ELONGATION: f64 = 0.8;
 fn formed(drawn: &Descriptors, form: &OutlineForm, rng: &mut Stream) -> Descriptors {
     let aligned = drawn.aligned();
     let elongation = form.elongation.map(|e| (e.mean + e.sd * random::normal(rng)).clamp(0.0, MAX_ELONGATION));
-    if elongation.is_none() && form.taper == 0.0 && form.unevenness == 1.0 {
+    if elongation.is_none() && form.taper == 0.0 && form.unevenness == 1.0 && form.variation == 0.0 {
         return aligned;
     }
+    // A log-normal factor whose square has the mean 1.
+    let varied =
+        if form.variation == 0.0 { 1.0 } else { libm::exp(form.variation * (random::normal(rng) - form.variation)) };
     let centre = aligned.harmonics();
     let radius = aligned.radius();
     let mut terms = aligned.as_slice().to_vec();
@@ -149,11 +152,10 @@ fn formed(drawn: &Descriptors, form: &OutlineForm, rng: &mut Stream) -> Descript
             // Position and radius.
             (0, _) | (1, false) => {}
             (1, true) => {
-                if let Some(elongation) = elongation {
-                    *term = [elongation * radius, 0.0];
-                }
+                let size = varied * elongation.map_or(term[0], |elongation| elongation * radius);
+                *term = [size.min(MAX_ELONGATION * radius), 0.0];
             }
-            _ => *term = [form.unevenness * term[0], form.unevenness * term[1]],
+            _ => *term = [varied * form.unevenness * term[0], varied * form.unevenness * term[1]],
         }
     }
     if let Some(asymmetry) = terms.get_mut(centre + 2) {

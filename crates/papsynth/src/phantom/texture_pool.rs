@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 use rand_core::Rng;
 use steerable_texture::{Pyramid, SynthesisParams, Synthesizer};
 
+use super::parametric_shape::placed;
 use super::tile::Point;
 use crate::error::ErrorKind;
 use crate::key::Key;
@@ -74,16 +75,29 @@ impl TexturePools {
         Ok(self.pools[index].get_or_init(|| Pool::new(&texels)))
     }
 
-    /// Draws a place, a direction and a mirroring. `pixel_um` is the size of the pixels that are drawn.
+    /// Draws a place, a direction, a mirroring and a stretch. `pixel_um` is the size of the pixels that are drawn.
     pub(crate) fn sampler<R: Rng + ?Sized>(&self, pixel_um: f64, rng: &mut R) -> PoolSampler {
         let step = pixel_um / self.texture.pixel_um;
-        let angle = random::direction(rng);
-        let mirrored = if random::chance(0.5, rng) { -step } else { step };
+        let [angle, stretched] = [0, 1].map(|_| random::direction(rng));
+        let mirror = if random::chance(0.5, rng) { -1.0 } else { 1.0 };
         let origin = [0, 1].map(|_| random::between(0.0, SIDE as f64, rng));
+        let stretch = libm::exp((STRETCH * random::normal(rng)).clamp(-MAX_STRETCH, MAX_STRETCH));
         let (sin, cos) = (libm::sin(angle), libm::cos(angle));
-        PoolSampler { origin, along: [step * cos, mirrored * sin], down: [-step * sin, mirrored * cos] }
+        // A rotation, a stretch of equal area, and another rotation.
+        let texels = |[x, y]: Point| {
+            let [x, y] = placed([x, y], stretched, [0.0; 2]);
+            let [x, y] = [step * x / stretch, step * mirror * y * stretch];
+            [cos * x + sin * y, cos * y - sin * x]
+        };
+        PoolSampler { origin, along: texels([1.0, 0.0]), down: texels([0.0, 1.0]) }
     }
 }
+
+/// Standard deviation of the logarithm of the stretch of a texture along a direction; across it, the texture is
+/// narrower by the same factor. On real slides, many cells have streaks.
+const STRETCH: f64 = 0.4;
+/// Maximum of this logarithm.
+const MAX_STRETCH: f64 = 0.7;
 
 /// Synthesizes the texture of a kind in the object: with the joint statistics as imaged, and the octaves without noise
 /// and blur.

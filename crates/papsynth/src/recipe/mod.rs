@@ -21,6 +21,7 @@ pub(crate) mod specimen;
 #[cfg(test)]
 mod tests;
 mod whole;
+mod widen;
 
 pub use crate::debris::{
     Bacilli, BareNuclei, Bubbles, Candidas, ClueCells, Cocci, Crystals, Debris, Dirt, Dust, Fibres, Leukocytes, Mucus,

@@ -247,7 +247,7 @@ section! {
     pub struct Folds {
         /// Probability of a flap, a part of the cell that is folded back, before multiplication with the pliability of
         /// the cell class.
-        flap: Number = 0.38, 0..=1;
+        flap: Number = 0.2, 0..=1;
         /// Probability of a rolled rim, before multiplication with the pliability of the cell class.
         roll: Number = 0.18, 0..=1;
         /// Probability that both sides of the cell are folded over, before multiplication with the pliability of the
@@ -276,17 +276,17 @@ section! {
         /// Angularity of the outline: 0 is smooth, 1 a polygon.
         angularity: Number (given f64) = Number::uniform(0.10, 0.60), 0..=1;
         /// Number of notches of the rim.
-        notches: Number (given usize) = Number::uniform(0.0, 14.0), 0..=20;
+        notches: Number (given usize) = Number::log_normal(2.5, 0.9).at_most(14.0), 0..=20;
         /// Number of protrusions of the rim.
-        protrusions: Number (given usize) = Number::uniform(0.0, 9.0), 0..=20;
+        protrusions: Number (given usize) = Number::log_normal(1.5, 0.9).at_most(9.0), 0..=20;
         /// Number of wrinkles: narrow folds of double thickness.
-        wrinkles: Number (given usize) = Number::log_normal(10.0, 0.6).at_most(60.0), 0..=100;
+        wrinkles: Number (given usize) = Number::log_normal(7.0, 0.6).at_most(60.0), 0..=100;
         /// Additional thickness at the crest of a wrinkle, relative to the flat sheet.
-        wrinkle_thickness: Number (given f64) = Number::log_normal(0.34, 0.42), 0..=5;
+        wrinkle_thickness: Number (given f64) = Number::log_normal(0.2, 0.42), 0..=5;
         /// Width of a wrinkle: standard deviation of its profile.
         wrinkle_um: Number (given f64) = Number::uniform(0.3, 1.3), 0.05..=5, "µm";
         /// Additional density and granularity of the cytoplasm around the nucleus, relative to the rest.
-        endoplasm: Number (given f64) = Number::log_normal(0.08, 0.6), 0..=2;
+        endoplasm: Number (given f64) = Number::log_normal(0.13, 0.5), 0..=2;
         /// Amplitude of the first level of detail, low-frequency Gaussian noise, relative to the absorbance of the
         /// cytoplasm.
         clouds: Number = Number::uniform(0.05, 0.18), 0..=2;
@@ -406,6 +406,9 @@ section! {
         clumping: Number = Number::uniform(0.0, 0.4), 0..=1;
         /// Softness of the edge of a nucleus: standard deviation of the falloff of its thickness at the outline.
         edge_um: Number = Number::uniform(0.0, 0.2), 0..=3, "µm";
+        /// Fraction of the cytoplasm of a cell that its nucleus displaces. The mean contrast of nuclei does not depend
+        /// on it, but nuclei in thick cytoplasm are fainter.
+        displacement: Number = 0.45, 0..=1;
     }
 }
 

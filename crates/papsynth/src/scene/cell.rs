@@ -93,8 +93,10 @@ pub struct NucleusBody {
     pub off_centre: [f64; 2],
     /// Direction of the long axis relative to that of the cell, degrees.
     pub rotation_deg: f64,
-    /// Mean absorbance in addition to the cytoplasm.
+    /// Mean absorbance in addition to the cytoplasm that it does not displace.
     pub absorbance: f64,
+    /// Fraction of the cytoplasm of the cell that it displaces.
+    pub displacement: f64,
     /// Dyes at staining strength 1.
     pub dyes: Amounts,
     /// Standard deviation of the absorbance.

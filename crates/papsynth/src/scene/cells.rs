@@ -235,11 +235,14 @@ fn draw_body(
     let contrast = normal_at_least(nucleus.chromatin.sd.mean, contrast_sd, 0.3, rng)
         / nucleus.absorbance.mean.max(f64::MIN_POSITIVE);
     let own_number = |(name, number): (&str, &Number)| number.draw(&mut own(name));
+    let displacement = own_number(named!(recipe.nucleus.displacement));
+    let displaced = displacement * cytoplasm.absorbance.median * stain.cytoplasm;
     let mut body = NucleusBody {
         radius_um: nucleus_um,
         off_centre: [distance * libm::cos(angle), distance * libm::sin(angle)],
         rotation_deg: random::between(0.0, 360.0, rng),
-        absorbance: nucleus_absorbance,
+        absorbance: nucleus_absorbance + displaced,
+        displacement,
         dyes: [0.0; dye_spectra::DYES],
         texture: contrast * nucleus_absorbance * stain.texture,
         rim: recipe.nucleus.rim.draw(rng),

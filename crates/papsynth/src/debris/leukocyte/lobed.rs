@@ -100,15 +100,15 @@ pub(super) fn make(leukocyte: &Leukocyte, context: &ObjectContext<'_>) -> Phanto
             turned.map(|p| context.to_grid([p[0] + at[0], p[1] + at[1]])).collect()
         })
         .collect();
-    let remains = leukocyte.remains.then(|| Remains::draw(cell_radius, context, &mut rng));
+    let remains = leukocyte.remains.then(|| remains(cell_radius, context, &mut rng));
 
-    let corners = remains.iter().flat_map(Remains::points);
+    let corners = remains.iter().flat_map(Tuft::corners);
     let points: Vec<Point> = outline.iter().chain(shapes.iter().flatten()).copied().chain(corners).collect();
     let mut canvas = context.canvas(&points, 0.0);
     canvas.coverage.cover(&outline);
     shade_cytoplasm(&mut canvas, &outline, leukocyte, context, &mut rng);
     if let Some(remains) = &remains {
-        remains.add(&mut canvas, leukocyte.cytoplasm_absorbance, context, &mut rng);
+        add_remains(remains, &mut canvas, context, &mut rng);
     }
     let vacuoles = match leukocyte.form {
         NucleusForm::Kidney => FOAM,
@@ -255,98 +255,46 @@ fn shade_cytoplasm(
     }
 }
 
-/// Granular remains and shreds of mucus that stick to a leukocyte.
-struct Remains {
-    tuft: Tuft,
-    /// Curved shreds, in grid points, with their half-widths.
-    shreds: Vec<(Vec<Point>, f64)>,
+/// Distance of the centre of remains from the centre of the cell, in radii of the cell: minimum, maximum.
+const REMAINS_DISTANCE: [f64; 2] = [0.5, 1.1];
+/// Half length of remains in radii of the cell: minimum, maximum.
+const REMAINS_LENGTH: [f64; 2] = [0.45, 1.1];
+/// Width of remains relative to their length: minimum, maximum.
+const REMAINS_WIDTH: [f64; 2] = [0.5, 1.0];
+/// Grain size of remains, µm: minimum, maximum.
+const REMAINS_GRAIN_UM: [f64; 2] = [0.6, 1.1];
+/// Contrast of the grains of remains.
+const REMAINS_GRANULARITY: f64 = 0.25;
+/// Irregularity of the outline of remains.
+const REMAINS_RAGGED: f64 = 1.2;
+/// Absorbance of remains: minimum, maximum.
+const REMAINS_ABSORBANCE: [f64; 2] = [0.06, 0.24];
+
+/// Draws granular remains of cytoplasm and mucus on one side of a cell of this radius, µm.
+fn remains(radius: f64, context: &ObjectContext<'_>, rng: &mut Stream) -> Tuft {
+    let side = random::direction(rng);
+    let distance = radius * random::between(REMAINS_DISTANCE[0], REMAINS_DISTANCE[1], rng);
+    let length = radius * random::between(REMAINS_LENGTH[0], REMAINS_LENGTH[1], rng);
+    let width = length * random::between(REMAINS_WIDTH[0], REMAINS_WIDTH[1], rng);
+    Tuft {
+        centre: context.to_grid([distance * libm::cos(side), distance * libm::sin(side)]),
+        half: [context.px(length), context.px(width)],
+        turn: random::direction(rng),
+        grain: context.px(random::between(REMAINS_GRAIN_UM[0], REMAINS_GRAIN_UM[1], rng)),
+        granularity: REMAINS_GRANULARITY,
+        ragged: REMAINS_RAGGED,
+        absorbance: random::between(REMAINS_ABSORBANCE[0], REMAINS_ABSORBANCE[1], rng),
+    }
 }
 
-/// Distance of the centre of a tuft from the centre of the cell, in radii of the cell: minimum, maximum.
-const TUFT_DISTANCE: [f64; 2] = [0.5, 1.1];
-/// Half length of a tuft in radii of the cell: minimum, maximum.
-const TUFT_LENGTH: [f64; 2] = [0.45, 1.0];
-/// Width of a tuft relative to its length: minimum, maximum.
-const TUFT_WIDTH: [f64; 2] = [0.5, 1.0];
-/// Grain size of a tuft, µm: minimum, maximum.
-const TUFT_GRAIN_UM: [f64; 2] = [0.6, 1.1];
-/// Contrast of the grains of a tuft.
-const TUFT_GRANULARITY: f64 = 0.35;
-/// Irregularity of the outline of a tuft.
-const TUFT_RAGGED: f64 = 1.2;
-/// Absorbance of a tuft: minimum, maximum.
-const TUFT_ABSORBANCE: [f64; 2] = [0.06, 0.24];
-/// Most shreds.
-const MAX_SHREDS: usize = 4;
-/// Length of a shred in radii of the cell: minimum, maximum.
-const SHRED_LENGTH: [f64; 2] = [0.4, 1.3];
-/// Half-width of a shred, µm: minimum, maximum.
-const SHRED_UM: [f64; 2] = [0.25, 0.8];
-/// Absorbance of a shred added to that of the cytoplasm.
-const SHRED_ABSORBANCE: f64 = 0.05;
-/// Straight segments of a shred.
-const SHRED_PARTS: usize = 4;
-/// Standard deviation of the change of direction per segment, radians.
-const SHRED_BEND: f64 = 0.35;
-
-impl Remains {
-    /// Draws remains on one side of a cell of this radius, µm.
-    fn draw(radius: f64, context: &ObjectContext<'_>, rng: &mut Stream) -> Self {
-        let side = random::direction(rng);
-        let distance = radius * random::between(TUFT_DISTANCE[0], TUFT_DISTANCE[1], rng);
-        let length = radius * random::between(TUFT_LENGTH[0], TUFT_LENGTH[1], rng);
-        let width = length * random::between(TUFT_WIDTH[0], TUFT_WIDTH[1], rng);
-        let tuft = Tuft {
-            centre: context.to_grid([distance * libm::cos(side), distance * libm::sin(side)]),
-            half: [context.px(length), context.px(width)],
-            turn: random::direction(rng),
-            grain: context.px(random::between(TUFT_GRAIN_UM[0], TUFT_GRAIN_UM[1], rng)),
-            granularity: TUFT_GRANULARITY,
-            ragged: TUFT_RAGGED,
-            absorbance: random::between(TUFT_ABSORBANCE[0], TUFT_ABSORBANCE[1], rng),
-        };
-        let shreds = (0..1 + random::below(MAX_SHREDS, rng))
-            .map(|_| {
-                let mut way = side + 0.8 * random::normal(rng);
-                let mut at = [0.8 * radius * libm::cos(way), 0.8 * radius * libm::sin(way)];
-                let step = radius * random::between(SHRED_LENGTH[0], SHRED_LENGTH[1], rng) / SHRED_PARTS as f64;
-                let points = (0..=SHRED_PARTS).map(|_| {
-                    let point = context.to_grid(at);
-                    way += SHRED_BEND * random::normal(rng);
-                    at = [at[0] + step * libm::cos(way), at[1] + step * libm::sin(way)];
-                    point
-                });
-                (points.collect(), context.px(random::between(SHRED_UM[0], SHRED_UM[1], rng)))
-            })
-            .collect();
-        Self { tuft, shreds }
-    }
-
-    /// Returns points whose bounding box contains the remains.
-    fn points(&self) -> impl Iterator<Item = Point> {
-        let ends = self.shreds.iter().flat_map(|(points, half_width)| {
-            points.iter().flat_map(move |p| [-half_width, *half_width].map(|by| [p[0] + by, p[1] + by]))
-        });
-        self.tuft.corners().into_iter().chain(ends)
-    }
-
-    /// Adds the remains to a cell.
-    fn add(&self, canvas: &mut ObjectCanvas, absorbance: f64, context: &ObjectContext<'_>, rng: &mut Stream) {
-        let mut tuft = canvas.blank();
-        self.tuft.draw(&mut tuft, context, rng);
-        let values = canvas.absorbance.values.iter_mut().zip(&tuft.absorbance.values);
-        values.for_each(|(value, added)| *value += added);
-        let covers = canvas.coverage.values.iter_mut().zip(&tuft.coverage.values);
-        covers.for_each(|(cover, other)| *cover = cover.max(*other));
-        let strength = 0.5 * absorbance + SHRED_ABSORBANCE;
-        for (points, half_width) in &self.shreds {
-            for (i, pair) in points.windows(2).enumerate() {
-                // Shreds taper to a point.
-                let half_widths = [i, i + 1].map(|i| half_width * (1.0 - 0.8 * i as f64 / SHRED_PARTS as f64));
-                canvas.stroke_max(&Stroke { ends: [pair[0], pair[1]], half_widths }, strength);
-            }
-        }
-    }
+/// Adds the remains to a cell.
+fn add_remains(remains: &Tuft, canvas: &mut ObjectCanvas, context: &ObjectContext<'_>, rng: &mut Stream) {
+    let mut tuft = canvas.blank();
+    remains.draw(&mut tuft, context, rng);
+    let values = canvas.absorbance.values.iter_mut().zip(&tuft.absorbance.values);
+    values.for_each(|(value, added)| *value += added);
+    let covers = canvas.coverage.values.iter_mut().zip(&tuft.coverage.values);
+    covers.for_each(|(cover, other)| *cover = cover.max(*other));
 }
 
 /// Sets the absorbance of a nucleus from the summed thickness of its lobes.

@@ -17,7 +17,7 @@ use crate::phantom::nucleus;
 use crate::phantom::piece::{MIN_ABSORBANCE, Phantom, Piece};
 use crate::phantom::tile::{Point, Tile, area};
 use crate::profile::Stage;
-use crate::scene::cell::{CellBody, Fold, FoldForm};
+use crate::scene::cell::{CellBody, Fold, FoldForm, NucleusBody};
 use crate::truth::part::Part;
 use crate::truth::traits::Trait;
 
@@ -176,11 +176,23 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
     let strength = body.cytoplasm_absorbance.max(MIN_ABSORBANCE) as f32;
     absorbance.values.iter_mut().zip(&coverage.values).for_each(|(value, cover)| *value *= cover * strength);
     let step = scene.grid().width / scene.sheet_grid().width;
+    displace(&mut absorbance, &plan.nucleus.absorbance.coarsened(step), &body.nucleus);
     let area_px = coverage.sum() * (step * step) as f64;
     let phase_rad = body.phase_rad / body.cytoplasm_absorbance.max(MIN_ABSORBANCE);
     let whole = Piece::whole(absorbance, coverage, area_px, body.dyes);
     let cytoplasm = Piece { part: Part::Cytoplasm, step, phase_rad, ..whole };
     Ok(Phantom { pieces: vec![cytoplasm, plan.nucleus], traits: traits(body) })
+}
+
+/// Removes the cytoplasm that the nucleus displaces, in proportion to the thickness of the nucleus.
+fn displace(cytoplasm: &mut Tile, nucleus: &Tile, body: &NucleusBody) {
+    let per_absorbance = 1.0 / body.absorbance.max(MIN_ABSORBANCE) as f32;
+    let displacement = body.displacement as f32;
+    cytoplasm.blend(nucleus, |values, nucleus| {
+        for (value, nucleus) in values.iter_mut().zip(nucleus) {
+            *value *= 1.0 - displacement * (nucleus * per_absorbance).clamp(0.0, 1.0);
+        }
+    });
 }
 
 fn traits(body: &CellBody) -> Vec<Trait> {

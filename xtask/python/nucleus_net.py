@@ -1,0 +1,214 @@
+"""Trains a small U-Net to find nuclei, and tests it on real fields.
+
+    nucleus_net.py --train SET [SET ...] --test FOLDER --out RESULT.json [--mask IMAGE MASK] [--steps N] [--seed N] [--weights FILE]
+
+A SET is a data set of `papsynth generate`, of which the masks of nuclei are learned, or a folder of PNG and CSV files with the centres of
+nuclei (y, x), of which discs are learned. SET:N uses its first N fields. Half of each batch comes from each SET. FOLDER holds real fields with
+centres and frames.csv with their grades. A nucleus is found if a detection lies within 12 pixels (4 µm). Writes the numbers of found, detected
+and annotated nuclei of every field, and the Dice coefficient of a mask at several scales, as JSON.
+"""
+
+import argparse
+import csv
+import json
+import os
+from pathlib import Path
+
+os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
+
+import numpy as np
+import tensorflow as tf
+from PIL import Image
+from scipy import ndimage
+from scipy.optimize import linear_sum_assignment
+
+SIDE, BATCH = 192, 8  # of the crops of a batch
+DISC = 10  # radius of the discs at annotated centres, pixels
+REACH = 12  # largest distance of a detection from a nucleus, pixels
+THRESHOLD = 0.85  # probability, fixed before any test
+SMALLEST = 60  # area of a detection, pixels
+SCALES = (1.0, 0.94)  # of the image with a mask, whose pixel size is not known exactly
+CHANNELS = 12  # of the first level of the network
+CONTRAST = 4.0  # factor on the images
+
+
+def normalized(image):
+    """Return the light relative to the empty slide, minus 1."""
+    grey = np.asarray(image.convert("L") if image.mode in ("RGB", "RGBA", "P") else image, dtype=np.float32)
+    empty = np.quantile(ndimage.zoom(grey, 0.125, order=1), 0.97)
+    return np.clip(grey / empty, 0, 1.3) - 1
+
+
+def centres(file):
+    """Return the annotated centres (y, x) of a field."""
+    rows = [row for row in csv.reader(file.open()) if row and row[0][:1].isdigit()]
+    return np.array([[float(value) for value in row[:2]] for row in rows]).reshape(-1, 2)
+
+
+def discs(shape, places):
+    """Return a mask with a disc at every place."""
+    mask = np.zeros(shape, np.float32)
+    y, x = np.mgrid[: shape[0], : shape[1]]
+    for at in places:
+        top, left = (max(int(v) - DISC, 0) for v in at)
+        part = np.s_[top : int(at[0]) + DISC + 1, left : int(at[1]) + DISC + 1]
+        mask[part] = np.maximum(mask[part], np.hypot(y[part] - at[0], x[part] - at[1]) <= DISC)
+    return mask
+
+
+def load(name):
+    """Return the fields of a set: pairs of an image and a mask of nuclei, separated where nuclei touch."""
+    path, _, count = name.partition(":")
+    folder, count = Path(path), int(count) if count else None
+    if not (folder / "images").is_dir():
+        files = sorted(folder.glob("*.png"))[:count]
+        images = [normalized(Image.open(file)) for file in files]
+        return [(image, discs(image.shape, centres(file.with_suffix(".csv")))) for image, file in zip(images, files)]
+    fields = []
+    for file in sorted((folder / "images").glob("*.png"))[:count]:
+        labels = np.asarray(Image.open(folder / "labels" / "nucleus" / f"{file.stem}.tif"))
+        border = np.zeros(labels.shape, bool)
+        for axis in (0, 1):
+            pair = [np.take(labels, range(s, labels.shape[axis] - 1 + s), axis) for s in (0, 1)]
+            touching = (pair[0] != pair[1]) & (pair[0] > 0) & (pair[1] > 0)
+            border |= np.pad(touching, [(1, 0) if a == axis else (0, 0) for a in (0, 1)])
+        fields.append((normalized(Image.open(file)), ((labels > 0) & ~border).astype(np.float32)))
+    return fields
+
+
+def network():
+    """Return the U-Net: four levels, 12 to 192 channels, one output."""
+    layers = tf.keras.layers
+
+    def block(x, channels):
+        for _ in range(2):
+            x = layers.ReLU()(layers.BatchNormalization()(layers.Conv2D(channels, 3, padding="same", use_bias=False)(x)))
+        return x
+
+    start = x = layers.Input((None, None, 1))
+    skipped = []
+    for level in range(4):
+        x = block(x, CHANNELS * 2**level)
+        skipped.append(x)
+        x = layers.MaxPool2D()(x)
+    x = block(x, CHANNELS * 16)
+    for level in reversed(range(4)):
+        x = layers.Conv2D(CHANNELS * 2**level, 3, padding="same")(layers.UpSampling2D()(x))
+        x = block(layers.Concatenate()([x, skipped[level]]), CHANNELS * 2**level)
+    return tf.keras.Model(start, layers.Conv2D(1, 1)(x))
+
+
+def crop(fields, rng):
+    """Return a random crop, most with a nucleus, turned, mirrored, and with other light, blur and noise."""
+    image, mask = fields[rng.integers(len(fields))]
+    for _ in range(12):
+        top, left = (rng.integers(0, size - SIDE + 1) for size in image.shape)
+        part = np.s_[top : top + SIDE, left : left + SIDE]
+        if mask[part].sum() > 150 or rng.random() < 0.2:
+            break
+    turns, mirrored = rng.integers(4), rng.random() < 0.5
+    grey, target = (np.rot90(values[part][::-1] if mirrored else values[part], turns) for values in (image, mask))
+    grey = grey * rng.uniform(0.8, 1.25) + rng.uniform(-0.03, 0.03)
+    if rng.random() < 0.5:
+        grey = ndimage.gaussian_filter(grey, rng.uniform(0.3, 1.2))
+    return grey + rng.normal(0, rng.uniform(0, 0.02), grey.shape), target
+
+
+def train(sets, steps, seed):
+    """Return the network after training on batches of which each set gives an equal part."""
+    rng = np.random.default_rng(seed)
+    tf.keras.utils.set_random_seed(seed)
+    net = network()
+    optimizer = tf.keras.optimizers.Adam(tf.keras.optimizers.schedules.CosineDecay(2e-3, steps))
+
+    @tf.function
+    def step(images, targets):
+        with tf.GradientTape() as tape:
+            logits = net(images, training=True)
+            found = tf.sigmoid(logits)
+            entropy = tf.reduce_mean(tf.nn.weighted_cross_entropy_with_logits(targets, logits, 3.0))
+            overlap = (2 * tf.reduce_sum(found * targets) + 1) / (tf.reduce_sum(found) + tf.reduce_sum(targets) + 1)
+            loss = entropy + 1 - overlap
+        optimizer.apply_gradients(zip(tape.gradient(loss, net.trainable_variables), net.trainable_variables))
+        return loss
+
+    for number in range(steps):
+        pairs = [crop(sets[k % len(sets)], rng) for k in range(BATCH)]
+        images, targets = (np.array(values, np.float32)[..., None] for values in zip(*pairs))
+        loss = float(step(images * CONTRAST, targets))
+        if number % 100 == 99:
+            print(f"step {number + 1} of {steps}, loss {loss:.3f}", flush=True)
+    return net
+
+
+def probability(net, image):
+    """Return the probability of nucleus of every pixel."""
+    margin = [(0, -size % 16) for size in image.shape]
+    padded = np.pad(image, margin, mode="reflect")[None, ..., None].astype(np.float32) * CONTRAST
+    return tf.sigmoid(net(padded, training=False)).numpy()[0, : image.shape[0], : image.shape[1], 0]
+
+
+def detections(found):
+    """Return the centres of the regions above the threshold."""
+    regions, count = ndimage.label(ndimage.binary_opening(found > THRESHOLD, iterations=2))
+    index = np.arange(1, count + 1)
+    if count == 0:
+        return np.zeros((0, 2))
+    areas = ndimage.sum_labels(np.ones(regions.shape), regions, index)
+    return np.array(ndimage.center_of_mass(regions > 0, regions, index))[areas >= SMALLEST]
+
+
+def matches(found, true):
+    """Return the number of nuclei with a detection of their own within reach."""
+    if len(found) == 0 or len(true) == 0:
+        return 0
+    distance = np.hypot(found[:, None, 0] - true[None, :, 0], found[:, None, 1] - true[None, :, 1])
+    rows, columns = linear_sum_assignment(np.where(distance <= REACH, distance, 1e4))
+    return int((distance[rows, columns] <= REACH).sum())
+
+
+def dice(net, image, mask):
+    """Return the Dice coefficient of a mask of nuclei, at each scale of the image."""
+    scores = []
+    for scale in SCALES:
+        found = ndimage.zoom(probability(net, ndimage.zoom(image, scale, order=1)), 1 / scale, order=1)
+        height, width = (min(sizes) for sizes in zip(found.shape, mask.shape))
+        pair = found[:height, :width] > THRESHOLD, mask[:height, :width] > 0
+        scores.append(float(2 * (pair[0] & pair[1]).sum() / max(pair[0].sum() + pair[1].sum(), 1)))
+    return scores
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--train", nargs="+", required=True)
+    parser.add_argument("--test", type=Path, required=True)
+    parser.add_argument("--mask", nargs=2, type=Path)
+    parser.add_argument("--steps", type=int, default=600)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--weights", help="file to which the weights are written, .weights.h5")
+    parser.add_argument("--out", type=Path, required=True)
+    options = parser.parse_args()
+    sets = [load(name) for name in options.train]
+    if not all(sets) or any(min(image.shape) < SIDE for fields in sets for image, _ in fields):
+        parser.error(f"each training set needs at least one field, of at least {SIDE} pixels")
+    net = train(sets, options.steps, options.seed)
+    result = {"train": options.train, "steps": options.steps, "seed": options.seed, "fields": []}
+    for row in csv.DictReader((options.test / "frames.csv").open()):
+        file = options.test / f"{row['frame']}.png"
+        found, true = detections(probability(net, normalized(Image.open(file)))), centres(file.with_suffix(".csv"))
+        counts = {"matched": matches(found, true), "detected": len(found), "nuclei": len(true)}
+        result["fields"].append({"frame": row["frame"], "grade": row["grade"].strip(), **counts})
+    if options.mask:
+        image, mask = (Image.open(file) for file in options.mask)
+        mask = np.asarray(mask)
+        result["dice"] = dice(net, normalized(image), mask if mask.ndim == 2 else mask[..., 0])
+        result["scales"] = SCALES
+    if options.weights:
+        net.save_weights(options.weights)
+    partial = options.out.with_suffix(".partial")
+    partial.write_text(json.dumps(result, indent=1))
+    partial.replace(options.out)
+
+
+if __name__ == "__main__":
+    main()

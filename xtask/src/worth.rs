@@ -1,0 +1,141 @@
+//! Trains a small network on synthetic and on real fields, and tests it on other real fields.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result};
+
+use crate::realism::{GRADES, PIXEL_UM, halves, program};
+use crate::shell::{self, skipped};
+use crate::workspace::Workspace;
+use crate::{dataset, python};
+
+/// Packages of the network.
+const PACKAGES: &str = "numpy\npillow\nscipy\n\
+    tensorflow-cpu; sys_platform == 'linux' and platform_machine == 'x86_64'\n\
+    tensorflow; sys_platform != 'linux' or platform_machine != 'x86_64'\n";
+
+/// Number of fields generated for each grade.
+const FRAMES: &str = "8";
+
+/// Trains a small network on synthetic and on real fields, and tests it on other real fields
+///
+/// Needs PAPSYNTH_REFERENCE. `papsynth match` fits a recipe to every second real field of each grade; a U-Net is trained
+/// on fields of the three recipes, on those real fields, or on both, and finds the nuclei of the other half. Then the
+/// halves change places. Writes every training to target/worth, where an interrupted run continues, and prints a table.
+/// Each training takes about five minutes on 2 cores; all of them take three hours.
+#[derive(clap::Args)]
+pub(crate) struct Worth {
+    /// Trainings with other random numbers
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    seeds: u32,
+    /// Steps of a training
+    #[arg(long, value_name = "N", default_value_t = 600)]
+    steps: u32,
+    /// Factor of `papsynth generate --widen`
+    #[arg(long, value_name = "FACTOR", default_value = "1.5")]
+    widen: String,
+    /// Also trains on another set: a data set of papsynth, or a folder of PNG files and CSV files with centres (y, x);
+    /// repeatable
+    #[arg(long, value_name = "NAME=FOLDER", value_parser = other)]
+    other: Vec<(String, PathBuf)>,
+    /// Only trains on these sets, such as `synthetic`, and names them in the table
+    #[arg(long, value_name = "NAME")]
+    only: Vec<String>,
+}
+
+fn other(text: &str) -> Result<(String, PathBuf), String> {
+    let word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    match text.split_once('=') {
+        Some((name, folder)) if !name.is_empty() && name.chars().all(word) && Path::new(folder).is_dir() => {
+            Ok((name.to_owned(), PathBuf::from(folder)))
+        }
+        _ => Err("expected NAME=FOLDER, with a name of letters, digits and _, and a folder that exists".to_owned()),
+    }
+}
+
+pub(crate) fn run(workspace: &Workspace, options: &Worth) -> Result<()> {
+    let Some(reference) = std::env::var_os("PAPSYNTH_REFERENCE").map(PathBuf::from) else {
+        return Err(skipped("PAPSYNTH_REFERENCE is not set, so there are no real fields"));
+    };
+    let python = python::environment(workspace, "worth", PACKAGES)?;
+    let folder = workspace.target.join("worth");
+    let results = folder.join("results");
+    shell::make(&results)?;
+    let halves = halves(&reference.join("cervix93"), &folder)?;
+    let mut trainings = Vec::new();
+    for half in [0, 1] {
+        let synthetic = synthetic(workspace, &folder, &halves[half], half, &options.widen)?;
+        let real = halves[half].display().to_string();
+        let synthetic = synthetic.display().to_string();
+        let name = match options.widen.as_str() {
+            "1.5" => "synthetic".to_owned(),
+            factor => format!("synthetic_widened_{}", factor.replace('.', "_")),
+        };
+        let mut arms = vec![
+            (name.clone(), vec![synthetic.clone()]),
+            ("real".to_owned(), vec![real.clone()]),
+            (format!("{name}_and_2_real"), vec![synthetic.clone(), format!("{real}:2")]),
+            (format!("{name}_and_4_real"), vec![synthetic.clone(), format!("{real}:4")]),
+            (format!("{name}_and_real"), vec![synthetic, real]),
+        ];
+        arms.extend(options.other.iter().map(|(name, folder)| (name.clone(), vec![folder.display().to_string()])));
+        for seed in 0..options.seeds {
+            trainings.extend(arms.iter().map(|(arm, sets)| (seed, half, arm.clone(), sets.clone())));
+        }
+    }
+    // The first seed of everything comes first, so that an interrupted run has a complete table.
+    trainings.sort_by_key(|(seed, ..)| *seed);
+    trainings.retain(|(_, _, arm, _)| options.only.is_empty() || options.only.contains(arm));
+    let count = trainings.len();
+    for (number, (seed, half, arm, sets)) in trainings.into_iter().enumerate() {
+        let result = results.join(format!("{arm}-{half}-{seed}.json"));
+        if result.exists() {
+            continue;
+        }
+        println!("training {} of {count}: {arm}, half {}, seed {seed}", number + 1, half + 1);
+        let mut command = Command::new(&python);
+        command.arg(workspace.root.join("xtask/python/nucleus_net.py")).arg("--train").args(sets);
+        command.arg("--test").arg(&halves[1 - half]).arg("--out").arg(&result);
+        command.args(["--seed", &seed.to_string(), "--steps", &options.steps.to_string(), "--mask"]);
+        command.args(["extended_focus.png", "nuclei.png"].map(|name| reference.join("focus_stack").join(name)));
+        shell::run(&mut command)?;
+    }
+    let mut command = Command::new(&python);
+    let table = shell::output(command.arg(workspace.root.join("xtask/python/worth_table.py")).arg(&results))?;
+    shell::write(&folder.join("table.md"), &table)?;
+    println!("\n{table}\nTrainings: {}", workspace.shown(&results));
+    Ok(())
+}
+
+/// Returns a folder with synthetic fields of all grades, matched to a half of the real ones.
+fn synthetic(workspace: &Workspace, folder: &Path, real: &Path, half: usize, widen: &str) -> Result<PathBuf> {
+    let out = folder.join(format!("synthetic-{half}-{widen}"));
+    if out.exists() {
+        return Ok(out);
+    }
+    let partial = folder.join("partial");
+    shell::remove(&partial)?;
+    for (grade, _, preset) in GRADES {
+        let recipe = folder.join(format!("matched-{grade}-{half}.toml"));
+        if !recipe.exists() {
+            let mut fit = program(workspace);
+            fit.args(["match", "--pixel-um", PIXEL_UM, "--group", grade, "--preset", preset, "--out"]);
+            shell::run(fit.arg(&recipe).arg(real))?;
+        }
+        let words = ["--frames", FRAMES, "--widen", widen, "--set", "slide.fields_per_slide=1"].map(PathBuf::from);
+        let fields = partial.join(grade);
+        dataset::generate(program(workspace), &fields, [recipe].into_iter().chain(words))?;
+        for part in ["images", "labels/nucleus"] {
+            shell::make(&partial.join("all").join(part))?;
+            for entry in std::fs::read_dir(fields.join(part)).with_context(|| format!("the fields of {grade}"))? {
+                let file = entry?.path();
+                let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                shell::copy(&file, &partial.join("all").join(part).join(format!("{grade}{name}")))?;
+            }
+        }
+    }
+    std::fs::rename(partial.join("all"), &out).with_context(|| format!("cannot write {}", out.display()))?;
+    shell::remove(&partial)?;
+    Ok(out)
+}
