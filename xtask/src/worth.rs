@@ -22,8 +22,8 @@ const FRAMES: &str = "8";
 ///
 /// Needs PAPSYNTH_REFERENCE. `papsynth match` fits a recipe to every second real field of each grade; a U-Net is
 /// trained on fields of the three recipes, on those real fields, or on both, and finds the nuclei of the other half.
-/// Then the halves change places. Writes every training to target/worth, where an interrupted run continues, and prints a
-/// table. Each training takes about five minutes on 2 cores; all of them take three hours.
+/// Then the halves change places. Every training is written to target/worth, where an interrupted run continues; a
+/// table is printed. Each training takes about five minutes on 2 cores; all of them take three hours.
 #[derive(clap::Args)]
 pub(crate) struct Worth {
     /// Trainings with other random numbers
