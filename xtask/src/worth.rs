@@ -33,7 +33,7 @@ pub(crate) struct Worth {
     #[arg(long, value_name = "N", default_value_t = 600)]
     steps: u32,
     /// Factor of `papsynth generate --widen`
-    #[arg(long, value_name = "FACTOR", default_value = "1.5")]
+    #[arg(long, value_name = "FACTOR", default_value = "1")]
     widen: String,
     /// Also trains on another set: a data set of papsynth, or a folder of PNG files and CSV files with centres (y, x);
     /// repeatable
@@ -69,7 +69,7 @@ pub(crate) fn run(workspace: &Workspace, options: &Worth) -> Result<()> {
         let real = halves[half].display().to_string();
         let synthetic = synthetic.display().to_string();
         let name = match options.widen.as_str() {
-            "1.5" => "synthetic".to_owned(),
+            "1" => "synthetic".to_owned(),
             factor => format!("synthetic_widened_{}", factor.replace('.', "_")),
         };
         let mut arms = vec![
