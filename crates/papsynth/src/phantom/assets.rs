@@ -202,3 +202,30 @@ fn quilt(recipe: &Recipe, class: &CellClass, pixel_um: f64) -> QuiltParams {
 
 /// Maximum number of random candidates before the best one is used.
 const MAX_TRIES: usize = 400;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::key::Key;
+
+    #[test]
+    fn a_variation_of_outlines_keeps_the_radius_and_the_variances() {
+        let harmonics = vec![[0.02, 0.01], [0.1, 0.0], [0.0, 0.0], [1.0, 0.0], [0.03, 0.0]];
+        let drawn = Descriptors::from_harmonics(harmonics).unwrap().aligned();
+        let form = OutlineForm { variation: 0.3, ..OutlineForm::default() };
+        let mut rng = Key { seed: 2, index: 0 }.stream("test", 0, "outlines");
+        const COUNT: u32 = 4000;
+        let (mut sum, mut extremes) = (0.0, [f64::INFINITY, 0.0_f64]);
+        for _ in 0..COUNT {
+            let outline = formed(&drawn, &form, &mut rng);
+            assert!((outline.radius() - drawn.radius()).abs() < 1e-12);
+            let factors = [-2, -1, 2].map(|l| outline.harmonic(l)[0] / drawn.harmonic(l)[0]);
+            assert!((factors[0] - factors[1]).abs() < 1e-9 && (factors[2] - factors[1]).abs() < 1e-9, "{factors:?}");
+            sum += factors[1] * factors[1];
+            extremes = [extremes[0].min(factors[1]), extremes[1].max(factors[1])];
+        }
+        // The square has the mean 1 and the standard deviation 0.66: a standard error of 0.01.
+        assert!((sum / f64::from(COUNT) - 1.0).abs() < 0.05, "{sum}");
+        assert!(extremes[0] < 0.5 && extremes[1] > 1.8, "{extremes:?}");
+    }
+}

@@ -214,6 +214,24 @@ pub(crate) mod tests {
         }
     }
 
+    #[test]
+    fn a_stretch_keeps_areas_and_differs_between_cells() {
+        let pools = TexturePools::new(&crate::model::Model::builtin().cytoplasm_texture.unwrap());
+        let mut rng = Key { seed: 4, index: 0 }.stream("test", 0, "stretch");
+        let step = 0.25 / pools.texel_um();
+        let mut ratios = Vec::new();
+        for _ in 0..400 {
+            let PoolSampler { along: [a, b], down: [c, d], .. } = pools.sampler(0.25, &mut rng);
+            let area = a * d - b * c;
+            assert!((area.abs() / (step * step) - 1.0).abs() < 1e-12, "{area}");
+            // Sum of the squared singular values: stretch² + 1/stretch².
+            let sum = (a * a + b * b + c * c + d * d) / (step * step);
+            ratios.push((0.5 * (sum + (sum * sum - 4.0).max(0.0).sqrt())).sqrt());
+        }
+        assert!(ratios.iter().all(|r| (1.0 - 1e-9..=libm::exp(MAX_STRETCH) + 1e-9).contains(r)));
+        assert!(ratios.iter().any(|r| *r > 1.5) && ratios.iter().any(|r| *r < 1.1));
+    }
+
     /// `PAPSYNTH_BLESS=1` rewrites the file.
     #[test]
     fn the_stored_pools_are_those_of_the_builtin_model() {

@@ -45,7 +45,8 @@ impl Recipe {
         if share.is_nan() || share <= 0.0 {
             return wide;
         }
-        for declared in self.numbers() {
+        let numbers = self.numbers();
+        for declared in &numbers {
             let Some(spread) = Spread::of(&declared.path, share) else { continue };
             match wide.number_mut(&declared.path) {
                 Some(NumberMut::Real(number)) => *number = spread.widen(number, declared.bounds),
@@ -56,9 +57,8 @@ impl Recipe {
             }
         }
         for condition in &mut wide.conditions {
-            let of_recipe = self.numbers();
             for (path, value) in &mut condition.numbers {
-                let declared = of_recipe.iter().find(|declared| declared.path == *path);
+                let declared = numbers.iter().find(|declared| declared.path == *path);
                 if let (Some(spread), Some(declared)) = (Spread::of(path, share), declared) {
                     *value = spread.widen_abundance(value, declared.bounds);
                 }

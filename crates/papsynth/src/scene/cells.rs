@@ -236,7 +236,8 @@ fn draw_body(
         / nucleus.absorbance.mean.max(f64::MIN_POSITIVE);
     let own_number = |(name, number): (&str, &Number)| number.draw(&mut own(name));
     let displacement = own_number(named!(recipe.nucleus.displacement));
-    let displaced = displacement * cytoplasm.absorbance.median * stain.cytoplasm;
+    // The mean contrast of nuclei does not depend on the displacement.
+    let displaced = displacement * cytoplasm.absorbance.median * stain.cytoplasm * mix.cytoplasm_stain.mean();
     let mut body = NucleusBody {
         radius_um: nucleus_um,
         off_centre: [distance * libm::cos(angle), distance * libm::sin(angle)],

@@ -176,7 +176,8 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
     let strength = body.cytoplasm_absorbance.max(MIN_ABSORBANCE) as f32;
     absorbance.values.iter_mut().zip(&coverage.values).for_each(|(value, cover)| *value *= cover * strength);
     let step = scene.grid().width / scene.sheet_grid().width;
-    displace(&mut absorbance, &plan.nucleus.absorbance.coarsened(step), &body.nucleus);
+    let NucleusBody { absorbance: level, displacement, .. } = body.nucleus;
+    displace(&mut absorbance, &plan.nucleus.absorbance.coarsened(step), level, displacement);
     let area_px = coverage.sum() * (step * step) as f64;
     let phase_rad = body.phase_rad / body.cytoplasm_absorbance.max(MIN_ABSORBANCE);
     let whole = Piece::whole(absorbance, coverage, area_px, body.dyes);
@@ -184,13 +185,13 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
     Ok(Phantom { pieces: vec![cytoplasm, plan.nucleus], traits: traits(body) })
 }
 
-/// Removes the cytoplasm that the nucleus displaces, in proportion to the thickness of the nucleus.
-fn displace(cytoplasm: &mut Tile, nucleus: &Tile, body: &NucleusBody) {
-    let per_absorbance = 1.0 / body.absorbance.max(MIN_ABSORBANCE) as f32;
-    let displacement = body.displacement as f32;
+/// Removes the cytoplasm that a nucleus displaces, in proportion to the thickness of the nucleus: its absorbance
+/// relative to `level`, at most 1.
+fn displace(cytoplasm: &mut Tile, nucleus: &Tile, level: f64, displacement: f64) {
+    let (per_level, displacement) = (1.0 / level.max(MIN_ABSORBANCE) as f32, displacement as f32);
     cytoplasm.blend(nucleus, |values, nucleus| {
         for (value, nucleus) in values.iter_mut().zip(nucleus) {
-            *value *= 1.0 - displacement * (nucleus * per_absorbance).clamp(0.0, 1.0);
+            *value *= 1.0 - displacement * (nucleus * per_level).clamp(0.0, 1.0);
         }
     });
 }
@@ -219,4 +220,19 @@ fn flat(absorbance: &mut Tile, coverage: &Tile, profile: &[f64], centre: Point, 
         }
         index += 1;
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_nucleus_displaces_cytoplasm_in_proportion_to_its_thickness() {
+        let mut cytoplasm = Tile { origin: [0, 0], width: 5, values: vec![0.2; 5] };
+        let nucleus = Tile { origin: [1, 0], width: 3, values: vec![0.15, 0.3, 0.6] };
+        displace(&mut cytoplasm, &nucleus, 0.3, 0.5);
+        for (found, expected) in cytoplasm.values.iter().zip([0.2, 0.15, 0.1, 0.1, 0.2]) {
+            assert!((found - expected).abs() < 1e-6, "{:?}", cytoplasm.values);
+        }
+    }
 }
