@@ -23,7 +23,8 @@ const FRAMES: &str = "8";
 /// Needs PAPSYNTH_REFERENCE. `papsynth match` fits a recipe to every second real field of each grade; a U-Net is
 /// trained on fields of the three recipes, on those real fields, or on both, and finds the nuclei of the other half.
 /// Then the halves change places. Every training is written to target/worth, where an interrupted run continues; a
-/// table is printed. Delete target/worth after a change of papsynth. Each training takes about five minutes on 2 cores; all of them take three hours.
+/// table is printed. Delete target/worth after a change of papsynth. Each training takes about five minutes on 2
+/// cores; all of them take three hours.
 #[derive(clap::Args)]
 pub(crate) struct Worth {
     /// Trainings with other random numbers
