@@ -63,6 +63,13 @@ impl Crease {
         }
     }
 
+    /// Returns how far a point lies beyond the line, perpendicular to its direction at `point`, in the unit of the
+    /// sheet; negative before the line.
+    #[must_use]
+    pub fn distance_beyond(&self, point: Point) -> f64 {
+        self.sheared(point)[1]
+    }
+
     /// Returns the direction beyond the line.
     fn normal(&self) -> Point {
         [-libm::sin(self.direction_rad), libm::cos(self.direction_rad)]
@@ -393,6 +400,16 @@ mod tests {
         // Neighbours share their edges: Euler, V − E + F = 1.
         sheet.update_edges();
         assert_eq!(sheet.vertices.len() + sheet.triangles().len(), sheet.edges.len() + 1);
+    }
+
+    #[test]
+    fn distances_beyond_a_line_are_perpendicular_to_its_direction() {
+        let curved = Crease { curvature: 0.02, ..CREASE };
+        for [t, s] in [[0.0, 0.0], [3.0, -2.0], [-8.0, 5.0]] {
+            assert!((curved.distance_beyond(curved.point_at([t, s])) - s).abs() < 1e-12);
+        }
+        let (normal, [x, y]) = (CREASE.normal(), CREASE.point);
+        assert!((CREASE.distance_beyond([x + 4.0 * normal[0], y + 4.0 * normal[1]]) - 4.0).abs() < 1e-12);
     }
 
     #[test]

@@ -33,7 +33,7 @@ const WRINKLES: core::ops::RangeInclusive<u32> = 3..=7;
 const WRINKLE: f64 = 0.075;
 
 /// Irregularity of the outline of a pyknotic nucleus: standard deviation of the second harmonic.
-const PYKNOTIC: f64 = 0.07;
+const PYKNOTIC: f64 = 0.05;
 
 /// Minimum width of the edge of a pyknotic nucleus, µm.
 const PYKNOTIC_EDGE_UM: f64 = 0.3;

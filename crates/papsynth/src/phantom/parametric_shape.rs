@@ -38,7 +38,7 @@ pub(crate) fn make_irregular<R: Rng + ?Sized>(outline: &mut [Point], strength: f
     let before = area(outline).abs();
     let waves: Vec<[f64; 3]> = HARMONICS
         .map(|harmonic| {
-            let amplitude = strength * random::normal(rng) * (2.0 / f64::from(harmonic)).sqrt();
+            let amplitude = strength * random::normal(rng) * 2.0 / f64::from(harmonic);
             [f64::from(harmonic), amplitude, random::direction(rng)]
         })
         .collect();

@@ -125,15 +125,17 @@ fn synthesized(kind: &TextureKind) -> Result<Vec<f32>, ErrorKind> {
     Ok(pyramid.reconstruct(&bands))
 }
 
-/// Returns the inverse of the loss of amplitude of an octave by bilinear interpolation at a random place. The high-pass
-/// residual is not compensated, because it is mostly noise.
+/// Returns the inverse of the loss of amplitude of an octave by bilinear interpolation at a random place.
 fn compensation(octave: usize, scales: usize) -> f64 {
-    if octave == 0 || octave > scales {
-        return 1.0;
-    }
+    /// Frequency of the high-pass residual, cycles per texel.
+    const HIGH_PASS: f64 = 0.45;
     // Centre of the octave, cycles per texel. The mean of |1 − u + u exp(2πif)|² over u from 0 to 1 is
     // 2/3 + cos(2πf)/3.
-    let frequency = 0.27 * libm::exp2(1.0 - octave as f64);
+    let frequency = match octave {
+        0 => HIGH_PASS,
+        octave if octave > scales => return 1.0,
+        octave => 0.27 * libm::exp2(1.0 - octave as f64),
+    };
     1.0 / ((2.0 + libm::cos(core::f64::consts::TAU * frequency)) / 3.0).sqrt()
 }
 

@@ -305,7 +305,7 @@ section! {
             (given f64 as texture: "Standard deviation of the fine texture, relative to the absorbance of the cytoplasm.")
             = 0.8, 0..=20;
         /// Probability that a cell is granular.
-        granular: Number (undrawn) = 0.2, 0..=1;
+        granular: Number (undrawn) = 0.14, 0..=1;
         /// Number of granules of a granular cell per 100 µm².
         granules: Number
             (given f64 as granules: "Number of granules per 100 µm², 0 if the cell is not granular.") = Number::log_normal(12.0, 0.6), 0..=1000;
@@ -431,6 +431,10 @@ section! {
         /// Factor by which the standard deviations of absorbance and texture between the nuclei of a class are
         /// multiplied. Drawn once per field.
         nucleus_variation: Number = 1.0, 0..=5;
+        /// Factor by which the standard deviations of the strength of the fine texture of cytoplasm, between cells and
+        /// between fields, are multiplied. Drawn once per field. Those of the model are measured on small areas, which
+        /// also differ within a cell.
+        texture_variation: Number = 0.4, 0..=5;
         /// Variation of the dye balance between slides: standard deviation of the logarithm of each dye's amount.
         slide_balance: Number = 0.15, 0..=2;
         /// Variation of the dye balance between the fields of a slide, as `slide_balance`.

@@ -31,6 +31,8 @@ pub(crate) struct FieldStain<'a> {
     /// absorbance and texture of nuclei.
     pub(super) cytoplasm_variation: f64,
     pub(super) nucleus_variation: f64,
+    /// Factor on the standard deviations of the strength of the texture of cytoplasm between cells and between fields.
+    pub(super) texture_variation: f64,
     /// Factors on the amounts of dyes.
     balance: Amounts,
 }
@@ -65,6 +67,7 @@ impl<'a> FieldStain<'a> {
             kind_of_texture: random::uniform(&mut field.key.stream("field", 0, "kind of texture")),
             cytoplasm_variation: field.draw(named!("stain", stain.cytoplasm_variation)),
             nucleus_variation: field.draw(named!("stain", stain.nucleus_variation)),
+            texture_variation: field.draw(named!("stain", stain.texture_variation)),
             balance,
         }
     }

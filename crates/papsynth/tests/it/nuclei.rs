@@ -1,8 +1,8 @@
-//! Nuclei and the cytoplasm that they displace.
+//! Nuclei and the cytoplasm that they displace; strength of the texture of cytoplasm.
 
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::Preset;
+use papsynth::recipe::{Preset, Recipe};
 use papsynth::scene::{Body, CellBody};
 use papsynth::{Engine, Inputs};
 
@@ -11,11 +11,18 @@ const STAIN: f64 = 0.6;
 
 /// Returns the cells of twelve fields.
 fn cells(displacement: f64) -> Vec<CellBody> {
+    cells_of(|recipe| {
+        recipe.nucleus.displacement = displacement.into();
+        recipe.cells.get_mut("superficial").unwrap().cytoplasm_stain = STAIN.into();
+    })
+}
+
+/// Returns the cells of twelve fields of even stain.
+fn cells_of(change: impl Fn(&mut Recipe)) -> Vec<CellBody> {
     let mut recipe = Preset::Lbc.recipe();
-    recipe.nucleus.displacement = displacement.into();
     recipe.stain.slide_cytoplasm = 1.0.into();
     recipe.stain.field_cytoplasm = 1.0.into();
-    recipe.cells.get_mut("superficial").unwrap().cytoplasm_stain = STAIN.into();
+    change(&mut recipe);
     let engine = Engine::new(&recipe, &Model::builtin(), &Inputs::default()).unwrap();
     let scenes = (0..12).map(|index| engine.scene(Key { seed: 6, index }).unwrap());
     let bodies = scenes.flat_map(|scene| scene.objects.into_iter().map(|object| object.body));
@@ -39,4 +46,27 @@ fn nuclei_replace_the_displaced_part_of_a_cell_of_their_class() {
         assert!((added - expected).abs() < 1e-6, "{}: {added} {expected}", none.class);
         assert!((much.cytoplasm_absorbance - none.cytoplasm_absorbance).abs() < 1e-12);
     }
+}
+
+#[test]
+fn the_strength_of_texture_varies_only_with_thickness_without_variation() {
+    let model = Model::builtin();
+    let kinds = &model.cytoplasm_texture.as_ref().unwrap().kinds;
+    let spread = |variation: f64| {
+        let cells = cells_of(|recipe| recipe.stain.texture_variation = variation.into());
+        let deviation = |cell: &CellBody| {
+            let kind = kinds.iter().find(|kind| kind.name == cell.textures[0]).unwrap();
+            let thickness = cell.cytoplasm_absorbance / model.classes[&cell.class].cytoplasm.absorbance.median;
+            (cell.detail.texture * thickness.sqrt() / kind.strength.median).ln()
+        };
+        let of_cells: Vec<f64> =
+            cells.iter().filter(|cell| cell.class == "intermediate").map(deviation).collect();
+        assert!(of_cells.len() > 100, "{}", of_cells.len());
+        let mean = of_cells.iter().sum::<f64>() / of_cells.len() as f64;
+        (of_cells.iter().map(|d| (d - mean) * (d - mean)).sum::<f64>() / of_cells.len() as f64).sqrt()
+    };
+    assert!(spread(0.0) < 1e-9);
+    // The deviations of the model: about 0.25 between cells, and as much between fields.
+    let [half, whole] = [0.5, 1.0].map(spread);
+    assert!((whole / half - 2.0).abs() < 1e-6 && (0.2..0.5).contains(&whole), "{half} {whole}");
 }

@@ -17,7 +17,7 @@ use crate::random;
 const GRANULE_UM: f64 = 0.28;
 
 /// Absorbance of a granule relative to the cytoplasm.
-const GRANULE: f64 = 0.75;
+const GRANULE: f64 = 0.55;
 
 /// Multiplies the thickness by clouds, flecks and the fine texture. `inner` is 1 in the endoplasm and 0 outside.
 pub(super) fn add_detail(
@@ -182,7 +182,14 @@ pub(super) fn thin_rim(absorbance: &mut Tile, coverage: &Tile, distance_px: f64)
     });
 }
 
-/// Multiplies values by a factor that increases from 0 at the rim to 1 at one radius inside.
+/// Returns the thickness of a sheet near its rim relative to the rest, at a distance from the rim in widths of the
+/// marginal zone.
+pub(super) fn thinning(distance: f64) -> f64 {
+    let inside = distance.clamp(0.0, 1.0);
+    inside * (2.0 - inside)
+}
+
+/// Multiplies values by a factor that increases from 0 at the rim to 1 at one radius inside: [`thinning`].
 #[multiversion(targets = "simd")]
 fn thin(values: &mut [f32], sums: &[f32], weight: f32) {
     for (value, sum) in values.iter_mut().zip(sums) {
@@ -195,7 +202,7 @@ fn thin(values: &mut [f32], sums: &[f32], weight: f32) {
 const LIFTED: f64 = 2.4;
 
 /// Increase of thickness there, relative to the density of the endoplasm: matched by eye to real cells.
-const LIFT: f32 = 2.2;
+const LIFT: f32 = 1.6;
 
 /// Steps of a radial ramp.
 const STEPS: usize = 6;
@@ -374,6 +381,21 @@ mod tests {
             let inside = (2.0 * sum / 81.0 - 1.0).clamp(0.0, 1.0);
             assert!((f64::from(*found) - inside * (2.0 - inside)).abs() < 1e-5, "{x} {y}: {found}");
         });
+    }
+
+    #[test]
+    fn folded_and_other_cells_become_thin_over_the_same_distance() {
+        let (radius, edge) = (6, 20.0);
+        let mut cover = Tile { origin: [0, 0], width: 60, values: vec![0.0; 60 * 41] };
+        cover.cover(&[[edge, -1.0], [70.0, -1.0], [70.0, 50.0], [edge, 50.0]]);
+        let mut thin = Tile { values: vec![1.0; 60 * 41], ..cover.clone() };
+        thin_rim(&mut thin, &cover, f64::from(radius));
+        for x in 20..40 {
+            let found = f64::from(at(&thin, [x, 20]));
+            let distance = (x as f64 - edge) / (f64::from(radius) + 0.5);
+            assert!((found - thinning(distance)).abs() < 1e-3, "{x}: {found} {}", thinning(distance));
+        }
+        assert!(thinning(0.0) == 0.0 && thinning(1.0) == 1.0 && thinning(3.0) == 1.0);
     }
 
     #[test]

@@ -139,7 +139,10 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
     }
     let rough: Vec<Vec<Point>> = pieces
         .iter()
-        .map(|p| outline::roughened(p, body.detail.fray_um / pixel_um, RIM_STEP_UM / pixel_um, &mut rng))
+        .map(|p| {
+            let on_crease = |p: Point| plan.creases.iter().any(|crease| crease.distance_beyond(p) > 0.0);
+            outline::roughened(p, body.detail.fray_um / pixel_um, RIM_STEP_UM / pixel_um, on_crease, &mut rng)
+        })
         .collect();
     let mut coverage = Tile::around(rough.iter().flatten(), 3.0);
     for piece in &rough {
@@ -148,6 +151,8 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
 
     let profile = &plan.class.class.cytoplasm.rim_to_centre;
     let mut absorbance = coverage.blank();
+    // A folded cell is thin at the rim of the sheet, part of which lies on the cell, but not along a crease.
+    let folded = sheet.is_some() && !plan.creases.is_empty();
     match sheet {
         Some(mut sheet) => {
             for crease in &plan.creases {
@@ -155,14 +160,18 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
             }
             let view =
                 PixelGrid { origin: [absorbance.origin[0] as f64, absorbance.origin[1] as f64], pixel_size: 1.0 };
+            let rim = if folded { body.detail.rim_um / body.radius_um } else { 0.0 };
             sheet.thickness_into(&mut absorbance.values, coverage.width, &view, |radius| {
-                interpolate(profile, 1.0 - radius)
+                let thinning = if rim > 0.0 { detail::thinning((1.0 - radius) / rim) } else { 1.0 };
+                interpolate(profile, 1.0 - radius) * thinning
             });
         }
         None => flat(&mut absorbance, &coverage, profile, plan.centre, body.radius_um / pixel_um),
     }
     detail::apply_gradient(&mut absorbance, plan.centre, body.radius_um / pixel_um, body.detail.thickness_gradient);
-    detail::thin_rim(&mut absorbance, &coverage, body.detail.rim_um / pixel_um);
+    if !folded {
+        detail::thin_rim(&mut absorbance, &coverage, body.detail.rim_um / pixel_um);
+    }
     let nucleus = [0, 1].map(|axis| plan.centre[axis] + body.nucleus.off_centre[axis] * body.radius_um / pixel_um);
     let mut canvas = vec![0.0; absorbance.values.len() + wrinkles::LANES];
     wrinkles::add(&mut absorbance, &coverage, &plan.outline, cell, &mut canvas);

@@ -145,8 +145,14 @@ fn displaced(outline: &[Point], depth: f64, rng: &mut Stream) -> Vec<Point> {
 /// Amplitude of the medium-scale roughness of the rim (a few micrometres), relative to the fine roughness.
 const MEDIUM_SCALE: f64 = 1.0;
 
-/// Returns an outline with fine, irregular displacements: the frayed rim of a cell.
-pub(super) fn roughened(outline: &[Point], depth_px: f64, step_px: f64, rng: &mut Stream) -> Vec<Point> {
+/// Returns an outline with fine, irregular displacements, except where it is `smooth`: the frayed rim of a cell.
+pub(super) fn roughened(
+    outline: &[Point],
+    depth_px: f64,
+    step_px: f64,
+    smooth: impl Fn(Point) -> bool,
+    rng: &mut Stream,
+) -> Vec<Point> {
     if depth_px < 0.05 || outline.len() < 3 {
         return outline.to_vec();
     }
@@ -168,7 +174,8 @@ pub(super) fn roughened(outline: &[Point], depth_px: f64, step_px: f64, rng: &mu
             let (tx, ty) = (after[0] - before[0], after[1] - before[1]);
             let length = (tx * tx + ty * ty).sqrt().max(1e-9);
             let frayed = fast * (0.35 + slow.max(0.0)) + MEDIUM_SCALE * medium * (0.3 + slow_of_medium.max(0.0));
-            let push = (0.5 * depth_px * frayed).clamp(-2.5 * depth_px, 2.5 * depth_px);
+            let push = if smooth(here) { 0.0 } else { 0.5 * depth_px * frayed };
+            let push = push.clamp(-2.5 * depth_px, 2.5 * depth_px);
             [here[0] + push * ty / length, here[1] - push * tx / length]
         })
         .collect()

@@ -13,9 +13,20 @@ use crate::random;
 /// Distance between the points of a wrinkle, µm.
 const STEP_UM: f64 = 0.5;
 
-/// Fraction of wrinkles that follow the rim.
-const ALONG_RIM: f64 = 0.5;
-/// Fraction of the other wrinkles that fork off a previous one.
+/// Fraction of wrinkles that are a rolled stretch of the rim.
+const ROLLED: f64 = 0.35;
+/// Thickness of a rolled stretch relative to that of a wrinkle: minimum, maximum.
+const ROLLED_THICKNESS: [f64; 2] = [0.8, 3.0];
+/// Width of a rolled stretch (standard deviation of its profile), µm: minimum, maximum.
+const ROLLED_UM: [f64; 2] = [0.4, 0.9];
+/// Distance of a rolled stretch from the rim, in radii of the cell: minimum, maximum.
+const ROLLED_INSET: [f64; 2] = [0.01, 0.04];
+
+/// Fraction of the other wrinkles that follow the rim.
+const ALONG_RIM: f64 = 0.4;
+/// Thickness of another wrinkle relative to the mean: minimum, maximum.
+const THICKNESS: [f64; 2] = [0.4, 1.6];
+/// Fraction of the remaining wrinkles that fork off a previous one.
 const FORKED: f64 = 0.35;
 
 /// Fraction of a wrinkle's length over which it rises or fades.
@@ -41,17 +52,27 @@ pub(super) fn add(
     let rim = if detail.wrinkles > 0 { fsd_shape::resample_along(outline, steps_round()) } else { Vec::new() };
     let mut drawn: Vec<Vec<Point>> = Vec::new();
     for _ in 0..detail.wrinkles {
+        let rolled = random::chance(ROLLED, rng);
         let path = match random::uniform(rng) {
-            u if u < ALONG_RIM => along_rim(outline, &rim, rng),
+            _ if rolled => along_rim(outline, &rim, random::between(ROLLED_INSET[0], ROLLED_INSET[1], rng), 0.0, rng),
+            u if u < ALONG_RIM => {
+                // Most wrinkles are near the rim, where a thin sheet folds freely.
+                let depth = random::uniform(rng);
+                along_rim(outline, &rim, 0.015 + 0.35 * depth * depth, random::between(-0.3, 0.3, rng), rng)
+            }
             u if u < ALONG_RIM + (1.0 - ALONG_RIM) * FORKED && !drawn.is_empty() => {
                 let stem = &drawn[random::below(drawn.len(), rng)];
                 forked(stem, outline, step, rng)
             }
             _ => across(outline, step, rng),
         };
+        let (width_um, thickness_range) = match rolled {
+            true => (random::between(ROLLED_UM[0], ROLLED_UM[1], rng), ROLLED_THICKNESS),
+            false => (detail.wrinkle_um * random::between(0.6, 1.6, rng), THICKNESS),
+        };
         let profile = WrinkleProfile {
-            width: detail.wrinkle_um * random::between(0.6, 1.6, rng) / pixel_um,
-            strength: detail.wrinkle_thickness * random::between(0.4, 1.6, rng),
+            width: width_um / pixel_um,
+            strength: detail.wrinkle_thickness * random::between(thickness_range[0], thickness_range[1], rng),
             side: if random::chance(0.5, rng) { 1.0 } else { -1.0 },
             rise: random::between(0.05, TAPER, rng),
             fall: random::between(0.1, 2.0 * TAPER, rng),
@@ -68,15 +89,12 @@ fn random_factors(count: usize, rng: &mut Stream) -> Vec<f64> {
     (0..count).map(|_| (0.9 + noise.next(rng)).clamp(0.0, 2.5)).collect()
 }
 
-/// Draws a path along the rim, moved inwards. `fine` is the outline at equal steps.
-fn along_rim(outline: &[Point], fine: &[Point], rng: &mut Stream) -> Vec<Point> {
+/// Draws a path along the rim, moved inwards by `inset` radii of the cell, plus `drift` from end to end. `fine` is the
+/// outline at equal steps.
+fn along_rim(outline: &[Point], fine: &[Point], inset: f64, drift: f64, rng: &mut Stream) -> Vec<Point> {
     let middle = fsd_shape::centroid(outline);
     let length = random::count(fine.len() as f64 * random::between(0.06, 0.35, rng)).max(4);
     let first = random::below(fine.len(), rng);
-    // Most wrinkles are near the rim, where a thin sheet folds freely.
-    let depth = random::uniform(rng);
-    let inset = 0.015 + 0.35 * depth * depth;
-    let drift = random::between(-0.3, 0.3, rng);
     let mut noise = Autoregression::new(0.022, rng);
     (0..length)
         .map(|i| {
