@@ -1398,6 +1398,12 @@ class Stain(Section):
     Drawn once per field. From 0 to 5.
     """
 
+    texture_variation: Number | None = None
+    """Factor by which the standard deviations of the strength of the fine texture of cytoplasm, between cells and between
+    fields, are multiplied. Drawn once per field. Those of the model are measured on small areas, which also differ
+    within a cell. From 0 to 5.
+    """
+
     slide_balance: Number | None = None
     """Variation of the dye balance between slides: standard deviation of the logarithm of each dye's amount. From 0 to 2."""
 

@@ -208,10 +208,7 @@ fn draw_body(
     const WIDEST: f64 = 0.72;
     nucleus_um = nucleus_um.min(WIDEST * radius_um);
     let density = libm::exp(stain.cytoplasm_variation * cytoplasm.absorbance.log_sd * random::normal(rng));
-    let cytoplasm_absorbance = cytoplasm.absorbance.median
-        * density
-        * stain.cytoplasm
-        * mix.cytoplasm_stain.draw(rng);
+    let cytoplasm_absorbance = cytoplasm.absorbance.median * density * stain.cytoplasm * mix.cytoplasm_stain.draw(rng);
     let mut detail = draw_detail(recipe, cytoplasm.pliability, rng, &own);
     let mut texture_rng = own("texture");
     let textures = [0, 1].map(|_| drawn_kind(texture, stain.kind_of_texture, &mut texture_rng));

@@ -59,8 +59,7 @@ fn the_strength_of_texture_varies_only_with_thickness_without_variation() {
             let thickness = cell.cytoplasm_absorbance / model.classes[&cell.class].cytoplasm.absorbance.median;
             (cell.detail.texture * thickness.sqrt() / kind.strength.median).ln()
         };
-        let of_cells: Vec<f64> =
-            cells.iter().filter(|cell| cell.class == "intermediate").map(deviation).collect();
+        let of_cells: Vec<f64> = cells.iter().filter(|cell| cell.class == "intermediate").map(deviation).collect();
         assert!(of_cells.len() > 100, "{}", of_cells.len());
         let mean = of_cells.iter().sum::<f64>() / of_cells.len() as f64;
         (of_cells.iter().map(|d| (d - mean) * (d - mean)).sum::<f64>() / of_cells.len() as f64).sqrt()
