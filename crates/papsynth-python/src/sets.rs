@@ -25,7 +25,10 @@ const MAX_FRAMES: u64 = 1_000_000_000;
 
 /// Generates frames for `papsynth.generate` and returns the numbers of frames "written" and "present".
 #[pyfunction]
-#[pyo3(signature = (engine, out, frames, seed=0, *, task=(0, 1), formats=None, frames_per_shard=None, without=None, scenes=false, threads=1, verify=false, progress=None, min_detectability=MIN_DETECTABILITY))]
+#[pyo3(signature = (
+    engine, out, frames, seed=0, *, task=(0, 1), formats=None, frames_per_shard=None, without=None, scenes=false,
+    threads=1, verify=false, progress=None, min_detectability=MIN_DETECTABILITY
+))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
 pub(crate) fn generate<'py>(
     py: Python<'py>,
