@@ -24,6 +24,9 @@ try:
 except ImportError:
     ome_types = None
 
+# The last four are nuclei and objects that look like nuclei. Those that cannot be seen are ignored.
+SEMANTIC = ["background", "cytoplasm", "folded-cytoplasm", "debris", "shred", "leukocyte", "bare-nucleus", "nucleus"]
+MIN_DETECTABILITY = 15
 GROUPS = {"cytoplasm": "cytoplasm", "nucleus": "nucleus", "whole": "debris"}
 
 
@@ -172,6 +175,9 @@ def check_images(folder, frame):
         equal(f"shape of {path}", labels[kind].shape, shape)
         wide = "u4" if labels[kind].max(initial=0) > 65535 else "u2"
         equal(f"type of {path}", labels[kind].dtype, np.dtype(wide))
+    path = folder / "labels" / "semantic" / f"{name}.png"
+    labels["semantic"] = np.asarray(Image.open(path))
+    equal(f"shape and type of {path}", (labels["semantic"].shape, labels["semantic"].dtype), (shape, np.dtype("u1")))
     return labels
 
 
@@ -183,6 +189,9 @@ def check_objects(coco, rows, frame, labels):
     layers = np.zeros(labels["layers"].shape, int)
     drawn = {kind: np.zeros(labels[kind].shape, np.int64) for kind in GROUPS.values()}
     counts = {}
+    # The semantic label image, class by class. Ignored objects are between debris and mimics.
+    order = [*SEMANTIC[:4], "ignored", *SEMANTIC[4:]]
+    rank = np.zeros(labels["semantic"].shape, np.uint8)
     for annotation, row in zip(annotations, rows):
         name = f"object {row['id']} ({row['part']}) of frame {index}"
         equal(f"id of {name}", annotation["object_id"], int(row["id"]))
@@ -209,6 +218,11 @@ def check_objects(coco, rows, frame, labels):
             equal(f"values of {column} of {name}", len(row[column].split(";")), len(frame["planes_um"]))
         values = [float(v) for v in row["detectability"].split(";")]
         equal(f"best_plane of {name}", int(row["best_plane"]), int(np.argmax(values)))
+        equal(f"semantic class of {name}", annotation["semantic_class"], row["semantic_class"])
+        due = row["semantic_class"] in SEMANTIC[4:] and float(row["best_detectability"]) < MIN_DETECTABILITY
+        equal(f"iscrowd of {name}", annotation["iscrowd"], int(due))
+        level = order.index("ignored" if due else row["semantic_class"])
+        rank = np.maximum(rank, level * complete)
         group = GROUPS[row["part"]]
         check(not drawn[group][visible > 0].any(), f"visible mask of {name} overlaps another of its group")
         drawn[group][visible > 0] = annotation["object_id"]
@@ -217,6 +231,8 @@ def check_objects(coco, rows, frame, labels):
     for kind, picture in drawn.items():
         check(np.array_equal(picture, labels[kind]), f"visible masks of frame {index} differ from labels/{kind}")
     check(np.array_equal(layers, labels["layers"]), f"masks of frame {index} differ from labels/layers")
+    value = np.array([255 if one == "ignored" else SEMANTIC.index(one) for one in order])
+    check(np.array_equal(value[rank], labels["semantic"]), f"masks of frame {index} differ from labels/semantic")
     equal(f"counts of frame {index}", counts, frame["objects"])
 
 

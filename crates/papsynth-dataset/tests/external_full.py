@@ -152,10 +152,12 @@ def check_row(row, bare, frame, categories):
     equal(f"objects of {what}", len(row["objects"]), len(frame.objects))
     for found, one in zip(row["objects"], frame.objects):
         annotation = one.annotation
-        keys = ["part", "kind", "class", "bethesda", "traits", "cluster", "bbox", "area", "visible_area", "area_um2", "depth_um", "mean_absorbance", "tint", "truncated"]
+        keys = ["part", "kind", "class", "bethesda", "traits", "semantic_class", "cluster", "bbox", "area", "visible_area"]
+        keys += ["area_um2", "depth_um", "mean_absorbance", "tint", "truncated"]
         for key in keys:
             equal(f"{key} of {one.name} in {what}", found[key], annotation[key])
         equal(f"id of {one.name} in {what}", found["id"], one.id)
+        equal(f"ignored of {one.name} in {what}", found["ignored"], annotation["iscrowd"] == 1)
         equal(f"category of {one.name}", categories[found["category"]]["id"], annotation["category_id"])
         for key, written in [("rle", "segmentation"), ("visible_rle", "visible")]:
             counts = annotation[written]["counts"]

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use numpy::{Element, IntoPyArray, PyArrayDyn, PyArrayMethods};
 use papsynth::Plane;
 use papsynth::scene::{ObjectKind, Tint};
-use papsynth::truth::{Bounds, Group, Mask, ObjectTruth, Part, Truth, UnknownTrait};
+use papsynth::truth::{Bounds, Group, MIN_DETECTABILITY, Mask, ObjectTruth, Part, SemanticClass, Truth, UnknownTrait};
 use papsynth_dataset::{Column, InputError, columns, rle, write_png};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -231,6 +231,60 @@ impl Frame {
         })
     }
 
+    /// Return the semantic class of each pixel. `papsynth.semantic_target` numbers chosen classes.
+    ///
+    /// Parameters
+    /// ----------
+    /// classes : list of str, optional
+    ///     Names from `papsynth.SEMANTIC_CLASSES`; objects of other classes are left out. Default: all classes.
+    /// min_detectability : float
+    ///     As for `papsynth.semantic_target`.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray
+    ///     (height, width), uint8: position of the class in `papsynth.SEMANTIC_CLASSES`, or 255 for ignored pixels.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     If a class is unknown, or `min_detectability` is negative or not finite.
+    #[pyo3(signature = (classes=None, *, min_detectability=MIN_DETECTABILITY))]
+    #[expect(clippy::needless_pass_by_value, reason = "owned argument of Python")]
+    fn semantic(&self, py: Python<'_>, classes: Option<Vec<String>>, min_detectability: f64) -> PyResult<Py<PyAny>> {
+        let least = checked_detectability(min_detectability)?;
+        let classes: Vec<SemanticClass> = match &classes {
+            None => SemanticClass::ALL.to_vec(),
+            Some(names) => names.iter().map(|name| semantic_class(name)).collect::<PyResult<_>>()?,
+        };
+        let Truth { width, height, .. } = self.truth;
+        array(py, py.detach(|| self.truth.semantic(&classes, least)), vec![height, width])
+    }
+
+    /// Return whether training should ignore each object: a nucleus, or an object that looks like one, that cannot be
+    /// seen.
+    ///
+    /// Parameters
+    /// ----------
+    /// min_detectability : float
+    ///     As for `papsynth.semantic_target`.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray
+    ///     (objects,), bool.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     If `min_detectability` is negative or not finite.
+    #[pyo3(signature = (min_detectability=MIN_DETECTABILITY))]
+    fn ignored(&self, py: Python<'_>, min_detectability: f64) -> PyResult<Py<PyAny>> {
+        let least = checked_detectability(min_detectability)?;
+        let objects = &self.truth.objects;
+        array(py, objects.iter().map(|object| object.is_ignored(least)).collect(), vec![objects.len()])
+    }
+
     /// Write `image` as PNG with its pixel size. An existing file is replaced.
     ///
     /// Parameters
@@ -276,6 +330,23 @@ impl Frame {
             "<papsynth.Frame {index} of seed {seed}: {width} x {height} px, {planes} planes, {cells} cells, {all} objects and parts>"
         )
     }
+}
+
+/// Checks a minimum of the detectability.
+pub(crate) fn checked_detectability(least: f64) -> PyResult<f64> {
+    match least.is_finite() && least >= 0.0 {
+        true => Ok(least),
+        false => {
+            Err(wrong(format!("min_detectability: {least} is out of range: expected a finite number of at least 0")))
+        }
+    }
+}
+
+fn semantic_class(name: &str) -> PyResult<SemanticClass> {
+    SemanticClass::by_name(name).ok_or_else(|| {
+        let known = SemanticClass::ALL.map(SemanticClass::name).join(", ");
+        wrong(format!("classes: unknown class `{name}`; expected some of {known}"))
+    })
 }
 
 /// Version; seed, index, slide; pixel size, planes, bits, width and height; image, stack and noise-free image; objects.

@@ -6,6 +6,7 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use papsynth::Threads;
+use papsynth::truth::MIN_DETECTABILITY;
 use papsynth_dataset::{
     Check, Dataset, DatasetInfo, Extra, Format, Layout, Location, Progress, Run, Task, missing_shards,
 };
@@ -14,6 +15,7 @@ use pyo3::types::{IntoPyDict, PyDict, PyList};
 
 use crate::engine::Engine;
 use crate::error::{self, wrong};
+use crate::frame::checked_detectability;
 
 /// Interval at which Python signals are checked.
 const POLL: Duration = Duration::from_millis(50);
@@ -23,7 +25,10 @@ const MAX_FRAMES: u64 = 1_000_000_000;
 
 /// Generates frames for `papsynth.generate` and returns the numbers of frames "written" and "present".
 #[pyfunction]
-#[pyo3(signature = (engine, out, frames, seed=0, *, task=(0, 1), formats=None, frames_per_shard=None, without=None, scenes=false, threads=1, verify=false, progress=None))]
+#[pyo3(signature = (
+    engine, out, frames, seed=0, *, task=(0, 1), formats=None, frames_per_shard=None, without=None, scenes=false,
+    threads=1, verify=false, progress=None, min_detectability=MIN_DETECTABILITY
+))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
 pub(crate) fn generate<'py>(
     py: Python<'py>,
@@ -39,6 +44,7 @@ pub(crate) fn generate<'py>(
     threads: usize,
     verify: bool,
     progress: Option<Bound<'py, PyAny>>,
+    min_detectability: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
     let made_by = engine.get();
     let (index, count) = task;
@@ -50,7 +56,8 @@ pub(crate) fn generate<'py>(
             return Err(wrong(format!("{name}: 0 is out of range: expected 1 or more")));
         }
     }
-    let layout = Layout { scenes, ..layout(formats, frames_per_shard, without)? };
+    let min_detectability = checked_detectability(min_detectability)?;
+    let layout = Layout { scenes, min_detectability, ..layout(formats, frames_per_shard, without)? };
     let info = DatasetInfo {
         recipe: made_by.engine.recipe(),
         model: &made_by.model,

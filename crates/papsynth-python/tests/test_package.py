@@ -4,6 +4,7 @@ PAPSYNTH names the program to compare with.
 """
 
 import copy
+import functools
 import json
 import multiprocessing
 import os
@@ -511,6 +512,63 @@ def test_targets_are_those_of_detectors():
     assert set(some["labels"]) <= {1, 2} and len(some["labels"]) > 0
     with pytest.raises(ValueError, match="part"):
         papsynth.detection_target(frame, "cell")
+
+
+def test_semantic_targets_have_nuclei_mimics_and_ignored_pixels(tmp_path):
+    from PIL import Image
+
+    debris = {"leukocytes": {"clusters": 8}, "bare_nuclei": {"count": 3}}
+    recipe = {**SMALL, "cells": {"intermediate": {"count": 6}}, "debris": debris}
+    frame = papsynth.render(recipe, seed=7)
+    names, table = papsynth.SEMANTIC_CLASSES, frame.table
+    assert names.index("background") == 0 and set(papsynth.MIMICS) == {"shred", "leukocyte", "bare-nucleus"}
+    assert set(table["semantic_class"][table["part"] == "nucleus"]) == {"nucleus"}
+    # Without a minimum, each pixel has the largest number of its masks.
+    number = np.array([names.index(name) for name in table["semantic_class"]], dtype=np.uint8)
+    everything = papsynth.semantic_target(frame, min_detectability=0)
+    assert everything.dtype == np.uint8 and everything.shape == (240, 320)
+    assert np.array_equal(everything, (number[:, None, None] * frame.masks).max(axis=0))
+    two = papsynth.semantic_target(frame, ["nucleus", papsynth.MIMICS], min_detectability=0)
+    of_class = np.isin(everything, [names.index(name) for name in papsynth.MIMICS])
+    assert np.array_equal(two == 1, everything == names.index("nucleus")) and np.array_equal(two == 2, of_class)
+    assert set(np.unique(two)) == {0, 1, 2}
+    # Ignored objects: nuclei and mimics whose best plane is below the minimum.
+    due = np.isin(table["semantic_class"], ["nucleus", *papsynth.MIMICS])
+    for least in (papsynth.MIN_DETECTABILITY, float(np.median(frame.detectability.max(axis=1)[due]))):
+        expected = due & (frame.detectability.max(axis=1) < least)
+        assert np.array_equal(frame.ignored(least), expected)
+        target = papsynth.semantic_target(frame, min_detectability=least)
+        assert (frame.masks[expected].any(axis=0) | (target != papsynth.IGNORED)).all()
+        assert not (frame.masks[due & ~expected].any(axis=0) & (target == papsynth.IGNORED)).any()
+        nuclei = papsynth.detection_target(frame, min_detectability=least)
+        assert np.array_equal(nuclei["iscrowd"], expected[table["part"] == "nucleus"])
+    assert expected.any() and not frame.ignored(0).any()
+    both = papsynth.detection_target(frame, None, ["nucleus", papsynth.MIMICS], by="semantic_class")
+    assert len(both["labels"]) == due.sum() and set(both["labels"]) == {1, 2}
+    assert np.array_equal(both["iscrowd"] == 1, frame.ignored()[due])
+    # A data set of samples, and files with the same values.
+    nucleus = functools.partial(papsynth.semantic_target, classes=["nucleus"], min_detectability=0)
+    samples = pickle.loads(pickle.dumps(papsynth.Dataset(recipe, 7, 2, transform=nucleus)))
+    assert np.array_equal(samples[0] == 1, everything == names.index("nucleus"))
+    papsynth.generate(recipe, tmp_path / "set", 1, seed=7, min_detectability=least)
+    assert np.array_equal(np.asarray(Image.open(tmp_path / "set/labels/semantic/000000.png")), target)
+    papsynth.merge(tmp_path / "set", 1)
+    annotations = json.loads((tmp_path / "set/coco.json").read_text())["annotations"]
+    assert [one["iscrowd"] for one in annotations] == list(expected)
+    assert not papsynth.verify(tmp_path / "set", 1)["findings"]
+    for call, message in (
+        (lambda: papsynth.semantic_target(frame, ["nuclei"]), "classes: unknown class `nuclei`; expected some of background, "),
+        (lambda: papsynth.semantic_target(frame, "nucleus"), "classes: 'nucleus'; expected a list of unique names"),
+        (lambda: papsynth.semantic_target(frame, ["shred", papsynth.MIMICS]), "expected a list of unique names"),
+        (lambda: papsynth.semantic_target(frame, min_detectability=-1), "min_detectability: -1 is out of range"),
+        (lambda: papsynth.detection_target(frame, min_detectability=np.inf), "min_detectability: inf is out of range"),
+        (lambda: papsynth.detection_target(frame, by="kind"), "by: 'kind'; expected 'class' or 'semantic_class'"),
+        (lambda: papsynth.detection_target(frame, None, ["x"], by="semantic_class"), "classes: unknown class 'x'"),
+        (lambda: papsynth.generate(recipe, tmp_path / "none", 1, min_detectability=np.nan), "min_detectability: NaN"),
+    ):
+        with pytest.raises(ValueError) as caught:
+            call()
+        assert message in str(caught.value)
 
 
 def test_a_frame_is_saved_as_a_picture(tmp_path):

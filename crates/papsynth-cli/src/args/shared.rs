@@ -5,6 +5,7 @@ use std::sync::Once;
 
 use clap::Args;
 use papsynth::recipe::{CameraPreset, Preset};
+use papsynth::truth::MIN_DETECTABILITY;
 use papsynth_dataset::{Extra, Flatten, Format, Layout};
 
 use super::values::{camera_parser, extra_parser, format_parser, integer, named, number, preset_parser};
@@ -93,6 +94,10 @@ pub(crate) struct FileArgs {
     /// Files to leave out, separated by commas
     #[arg(long, value_name = "FILES", value_parser = extra_parser(), value_delimiter = ',')]
     pub(crate) without: Vec<Extra>,
+    /// Ignore nuclei, and objects like nuclei, with a lower contrast-to-noise ratio in their best plane: value 255 in
+    /// labels/semantic, iscrowd 1 in COCO; 0 ignores none
+    #[arg(long, value_name = "RATIO", default_value_t = MIN_DETECTABILITY, value_parser = number(0.0, 1e6))]
+    pub(crate) min_detectability: f64,
     /// Write the table of objects as CSV only, without Parquet
     #[cfg(feature = "parquet")]
     #[arg(long)]
@@ -116,6 +121,7 @@ impl FileArgs {
     pub(crate) fn layout(&self, formats: Vec<Format>) -> Layout {
         let mut layout = Layout::new(formats).without(self.without.iter().copied());
         layout.flatten = self.flatten;
+        layout.min_detectability = self.min_detectability;
         #[cfg(feature = "parquet")]
         if self.no_parquet {
             layout.objects_parquet = false;

@@ -50,7 +50,7 @@ fn tasks_write_the_files_of_one_run_and_merge_requires_all_shards() {
 fn files_that_are_left_out_are_not_written_and_not_missed() {
     let bench = Bench::new("without");
     bench.good(&format!("generate --out all --frames 3 {TINY}"));
-    let without = "--without noise-free,layers,contact-sheet";
+    let without = "--without noise-free,layers,semantic,contact-sheet";
     let frames = format!("--frames 3 {without} {TINY}");
     let run = bench.good(&format!("generate --out some --task 1/2 {frames}"));
     assert!(run.out.contains("papsynth merge some --frames 3"), "{}", run.out);
@@ -62,7 +62,7 @@ fn files_that_are_left_out_are_not_written_and_not_missed() {
     assert!(!run.out.contains("contact-sheet.png"), "{}", run.out);
     let (all, some) = (bench.files("all"), bench.files("some"));
     let left_out = |name: &str| {
-        name.starts_with("noise-free/") || name.starts_with("labels/layers/") || name == "contact-sheet.png"
+        ["noise-free/", "labels/layers/", "labels/semantic/", "contact-sheet.png"].iter().any(|it| name.starts_with(it))
     };
     assert_eq!(some.keys().collect::<Vec<_>>(), all.keys().filter(|name| !left_out(name)).collect::<Vec<_>>());
     let records_the_layout =
@@ -71,7 +71,10 @@ fn files_that_are_left_out_are_not_written_and_not_missed() {
         assert_eq!(*bytes, all[name], "{name}");
     }
     let card = String::from_utf8(some["README.md"].clone()).unwrap();
-    assert!(card.contains("| `images/, preview/, labels/` |") && card.contains("without noise-free, layers"), "{card}");
+    assert!(
+        card.contains("| `images/, preview/, labels/` |") && card.contains("without noise-free, layers, semantic"),
+        "{card}"
+    );
     // A missing file that is not left out is found.
     fs::remove_file(bench.path("some/labels/debris/000001.tif")).unwrap();
     assert!(bench.run("verify some").out.contains("labels/debris/000001.tif"));
@@ -79,7 +82,7 @@ fn files_that_are_left_out_are_not_written_and_not_missed() {
     root(&bench, "some", 3);
     // Another choice is another layout.
     let run = bench.run(&format!("generate --out some --frames 3 {TINY}"));
-    assert!(run.code == 2 && run.err.contains("without noise-free, layers, contact-sheet"), "{}", run.err);
+    assert!(run.code == 2 && run.err.contains("without noise-free, layers, semantic, contact-sheet"), "{}", run.err);
     for (options, expected) in [
         ("--without noise", "noise-free"),
         ("--without noise-free --format cellpose", "cellpose does not contain it"),

@@ -47,7 +47,7 @@ pub(super) fn card(dataset: &Dataset, writer: &str, summary: &Summary) -> String
         let folders = [
             ("images/", true),
             ("preview/", has(&[Extra::Preview])),
-            ("labels/", has(&[Extra::Labels, Extra::Layers])),
+            ("labels/", has(&[Extra::Labels, Extra::Layers, Extra::Semantic])),
             ("noise-free/", has(&[Extra::NoiseFree])),
         ];
         let folders: Vec<&str> = folders.into_iter().filter(|(_, is_there)| *is_there).map(|(name, _)| name).collect();

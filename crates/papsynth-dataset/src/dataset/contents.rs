@@ -218,7 +218,7 @@ fn own_document(
     let counted = frame.clone().counted(truth, &saturated, frame.clipped_px.clone(), layout.flatten);
     check(counted == *frame, format!("image {index}: the summary in the record differs"))?;
     let files = layout.images_of(identity.seed, *shard, frame);
-    let own = Document::of_frame(truth, frame, &saturated, &document.categories, files)
+    let own = Document::of_frame(truth, frame, &saturated, &document.categories, files, layout.min_detectability)
         .map_err(|category| Error::input(coco)(InputError::unfit(format!("the category `{category}` is missing"))))?;
     let same = own.images.first() == document.image(index);
     check(same, format!("image {index}: file name or size differ from the record")).map(|()| own)

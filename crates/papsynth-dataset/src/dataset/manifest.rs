@@ -15,7 +15,7 @@ use crate::formats::{Layout, names};
 use crate::truth::Category;
 
 /// The head of `manifest.json` and the merged files of its list. The records of shards list the other files.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Manifest {
     /// Program and version that wrote it.
     pub writer: String,

@@ -138,7 +138,7 @@ impl ShardWriter<'_> {
         let Dataset { identity, layout, categories, .. } = self.dataset;
         let frame = frame.counted(truth, &saturated, clipped_px, layout.flatten);
         let files = self.dataset.image_paths(&frame, self.shard);
-        let document = Document::of_frame(truth, &frame, &saturated, categories, files)
+        let document = Document::of_frame(truth, &frame, &saturated, categories, files, layout.min_detectability)
             .map_err(|category| frame.wrong(format!("the recipe has no category `{category}`")))?;
         let field = Field::new(identity.seed, &frame, truth, &document, &levels);
         for sink in &mut self.sinks {

@@ -1,10 +1,10 @@
 //! `folder`: PNG and TIFF files in folders.
 
 use papsynth::Plane;
-use papsynth::truth::Group;
+use papsynth::truth::{Group, SemanticClass, Truth};
 
 use super::depth::{Depth, TRAINING_BITS};
-use super::format::Extra;
+use super::format::{Extra, Layout};
 use super::names;
 use super::ome::{Levels, description, label_tiff, page};
 use super::sink::{Field, Files, Sink};
@@ -12,13 +12,18 @@ use super::written::{LIMITS, Written, is_described};
 use crate::error::{Error, InputError};
 use crate::read;
 use crate::truth::{Flatten, FrameSummary, overlaps};
-use crate::write::{Pages, Pixels};
+use crate::write::{self, Pages, Pixels};
 
 #[derive(Default)]
 pub(super) struct Frames {
     /// The planes of a stack; a single plane becomes a PNG.
     stack: Option<Pages>,
     noise_free: Option<Pages>,
+}
+
+/// Returns the value of each pixel of the semantic label image.
+fn semantic<T: From<u8>>(truth: &Truth, layout: &Layout) -> impl Iterator<Item = T> {
+    truth.semantic(&SemanticClass::ALL, layout.min_detectability).into_iter().map(T::from)
 }
 
 pub(super) fn check(written: &Written) -> Result<(), Error> {
@@ -47,6 +52,10 @@ pub(super) fn check(written: &Written) -> Result<(), Error> {
     for group in Group::ALL.into_iter().filter(|_| has(Extra::Labels)) {
         let ids = truth.labels(group).ids;
         written.file(&names::labels(group, index), |bytes| written.labels(bytes, ids))?;
+    }
+    if has(Extra::Semantic) {
+        let classes = semantic(truth, written.layout).collect();
+        written.file(&names::semantic(index), |bytes| written.labels(bytes, classes))?;
     }
     if has(Extra::Layers) {
         let layers: Vec<u32> = truth.layers().into_iter().map(u32::from).collect();
@@ -92,6 +101,10 @@ impl Sink for Frames {
         }
         for group in Group::ALL.into_iter().filter(|_| layout.has_extra(Extra::Labels)) {
             files.encode(&names::labels(group, index), label_tiff(Flatten::Top.labels(field.truth, group), frame))?;
+        }
+        if layout.has_extra(Extra::Semantic) {
+            let classes: Vec<u16> = semantic(field.truth, layout).collect();
+            files.encode(&names::semantic(index), write::png(&classes, frame.width, 1, 8, frame.pixel_um))?;
         }
         if layout.has_extra(Extra::Layers) {
             files.encode(&names::layers(index), label_tiff(overlaps(field.truth), frame))?;

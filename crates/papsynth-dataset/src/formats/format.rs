@@ -4,6 +4,7 @@ use std::fmt::{self, Formatter};
 use std::ops::Range;
 use std::path::Path;
 
+use papsynth::truth::MIN_DETECTABILITY;
 use serde::{Deserialize, Serialize};
 
 use super::depth::Depth;
@@ -140,6 +141,8 @@ pub enum Extra {
     Layers,
     /// Label images of cytoplasm, nuclei and debris, of the format [`Folder`](Format::Folder).
     Labels,
+    /// Semantic label images, of the format [`Folder`](Format::Folder).
+    Semantic,
     /// Images of 8 bits for cameras with more bits, of the format [`Folder`](Format::Folder).
     Preview,
     /// The contact sheet.
@@ -148,7 +151,8 @@ pub enum Extra {
 
 impl Extra {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::NoiseFree, Self::Layers, Self::Labels, Self::Preview, Self::ContactSheet];
+    pub const ALL: [Self; 6] =
+        [Self::NoiseFree, Self::Layers, Self::Labels, Self::Semantic, Self::Preview, Self::ContactSheet];
 
     /// Returns the name.
     #[must_use]
@@ -157,6 +161,7 @@ impl Extra {
             Self::NoiseFree => "noise-free",
             Self::Layers => "layers",
             Self::Labels => "labels",
+            Self::Semantic => "semantic",
             Self::Preview => "preview",
             Self::ContactSheet => "contact-sheet",
         }
@@ -169,6 +174,7 @@ impl Extra {
             Self::NoiseFree => "images without noise, of the format folder: 5/6 of its bytes",
             Self::Layers => "numbers of overlapping cytoplasms, of the format folder",
             Self::Labels => "label images of cytoplasm, nuclei and debris, of the format folder",
+            Self::Semantic => "semantic label images, of the format folder",
             Self::Preview => "images of 8 bits for cameras with more bits, of the format folder",
             Self::ContactSheet => "contact-sheet.png",
         }
@@ -190,7 +196,7 @@ impl Extra {
 const MOST_FRAMES_PER_SHARD: u64 = 1_000_000_000;
 
 /// The layout of a data set in files. It is fixed when the data set is created, and is recorded in the manifest.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Layout {
     /// The formats, in the order of [`Format::ALL`], without duplicates; at least one.
@@ -209,6 +215,20 @@ pub struct Layout {
     /// The files that are left out, in the order of [`Extra::ALL`], without duplicates.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<Extra>,
+    /// Nuclei and mimics of nuclei whose best detectability is below this number are ignored: 255 in semantic label
+    /// images, `iscrowd` 1 in COCO. Finite and at least 0; at 0, no object is ignored.
+    #[serde(default = "min_detectability", skip_serializing_if = "is_default")]
+    pub min_detectability: f64,
+}
+
+fn min_detectability() -> f64 {
+    MIN_DETECTABILITY
+}
+
+/// Whether a minimum of the detectability is the default.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_default(min_detectability: &f64) -> bool {
+    min_detectability.total_cmp(&MIN_DETECTABILITY).is_eq()
 }
 
 impl Default for Layout {
@@ -236,6 +256,7 @@ impl Layout {
             objects_parquet: HAS_PARQUET,
             scenes: false,
             without: Vec::new(),
+            min_detectability: MIN_DETECTABILITY,
         }
     }
 
@@ -255,9 +276,13 @@ impl Layout {
     }
 
     /// Returns an error message if the layout is without files that one of its formats needs, or that none of its
-    /// formats has.
+    /// formats has, or if the minimum of the detectability is out of range.
     #[must_use]
     pub fn refusal(&self) -> Option<String> {
+        let least = self.min_detectability;
+        if !(least.is_finite() && least >= 0.0) {
+            return Some(format!("min_detectability: {least} is out of range: expected a finite number of at least 0"));
+        }
         self.without.iter().find_map(|&extra| {
             let name = extra.name();
             if let Some(format) = self.formats.iter().find(|format| extra.is_needed_by(**format)) {
@@ -336,9 +361,14 @@ impl fmt::Display for Layout {
         let frames = if self.frames_per_shard == 1 { "frame" } else { "frames" };
         let scenes = if self.scenes { ", with scenes" } else { "" };
         let without = if self.without.is_empty() { String::new() } else { format!(", {}", self.left_out()) };
+        let least = if is_default(&self.min_detectability) {
+            String::new()
+        } else {
+            format!(", minimum detectability {}", self.min_detectability)
+        };
         write!(
             f,
-            "{} with {} {} per shard, {}{table}{scenes}{without}",
+            "{} with {} {} per shard, {}{table}{scenes}{without}{least}",
             names.join(","),
             self.frames_per_shard,
             frames,
@@ -353,11 +383,11 @@ mod tests {
 
     #[test]
     fn files_that_a_format_needs_or_no_format_has_cannot_be_left_out() {
-        use Extra::{ContactSheet, Labels, Layers, NoiseFree, Preview};
+        use Extra::{ContactSheet, Labels, Layers, NoiseFree, Preview, Semantic};
         let layout = |formats: &[Format], without: &[Extra]| {
             Layout::new(formats.iter().copied()).without(without.iter().copied())
         };
-        let all = layout(&[Format::Folder], &[ContactSheet, Layers, NoiseFree, Labels, Preview, Layers]);
+        let all = layout(&[Format::Folder], &[ContactSheet, Layers, NoiseFree, Labels, Semantic, Preview, Layers]);
         assert_eq!(all.without, Extra::ALL);
         assert!(all.check().is_ok() && Extra::ALL.iter().all(|extra| !all.has_extra(*extra)));
         assert!(layout(&[Format::Folder, Format::Cellpose], &[NoiseFree, Layers]).refusal().is_none());
@@ -383,5 +413,20 @@ mod tests {
         let text = serde_json::to_string(&Layout::default()).unwrap();
         assert!(!text.contains("without") && serde_json::from_str::<Layout>(&text).unwrap() == Layout::default());
         assert!(layout.to_string().ends_with(", without layers"), "{layout}");
+    }
+
+    #[test]
+    fn the_minimum_of_the_detectability_is_recorded_unless_it_is_the_default() {
+        let of = |min_detectability| Layout { min_detectability, ..Layout::default() };
+        let text = serde_json::to_string(&of(0.25)).unwrap();
+        assert!(text.ends_with(r#""min_detectability":0.25}"#), "{text}");
+        assert_eq!(serde_json::from_str::<Layout>(&text).unwrap(), of(0.25));
+        assert!(of(0.25).to_string().ends_with(", minimum detectability 0.25") && of(0.0).check().is_ok());
+        assert!(!serde_json::to_string(&Layout::default()).unwrap().contains("detectability"));
+        for wrong in [-1.0, f64::NAN, f64::INFINITY] {
+            let message = of(wrong).refusal().unwrap();
+            assert!(message.contains(&format!("min_detectability: {wrong} is out of range")), "{message}");
+            assert!(of(wrong).check().is_err());
+        }
     }
 }

@@ -54,6 +54,10 @@ pub(crate) fn layers(index: u64) -> String {
     format!("labels/layers/{index:06}.tif")
 }
 
+pub(crate) fn semantic(index: u64) -> String {
+    format!("labels/semantic/{index:06}.png")
+}
+
 pub(crate) fn table(shard: u64) -> String {
     format!("{TABLES}/{shard:06}.csv")
 }

@@ -108,6 +108,8 @@ fn properties(field: &Field, group: Group, shown: &BTreeSet<u32>) -> Vec<(u32, M
                 ("class", json!(object.class)),
                 ("bethesda", json!(object.bethesda)),
                 ("kind", json!(object.kind.name())),
+                ("semantic_class", json!(object.semantic_class().name())),
+                ("ignored", json!(annotation.iscrowd == 1)),
                 // Nucleus and cell have the same label.
                 ("parent", json!(annotation.parent_id.map(|_| object.id))),
                 ("depth_um", json!(object.depth_um)),

@@ -26,7 +26,13 @@ fn collection(field: &Field) -> Collection {
     let name = |o: &ObjectTruth| format!("papsynth {seed} {index} {} {:?}", o.id, o.part);
     let measure = |object: &ObjectTruth, nucleus: Option<&ObjectTruth>| {
         let mut all = json!({ "Area µm^2": object.area_um2, "Depth µm": object.depth_um, "Mean absorbance": object.mean_absorbance });
+        if let Some(best) = object.best_detectability() {
+            all["Detectability"] = best.into();
+        }
         if let Some(nucleus) = nucleus {
+            if let Some(best) = nucleus.best_detectability() {
+                all["Nucleus: Detectability"] = best.into();
+            }
             all["Nucleus: Area µm^2"] = nucleus.area_um2.into();
             all["Nucleus: Mean absorbance"] = nucleus.mean_absorbance.into();
         }

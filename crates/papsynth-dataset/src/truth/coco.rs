@@ -67,7 +67,8 @@ pub(crate) struct Annotation {
     pub(crate) category_id: u32,
     bbox: [u32; 4],
     area: u64,
-    iscrowd: u8,
+    /// 1 for an ignored object: a nucleus or a mimic of a nucleus that cannot be seen, else 0.
+    pub(crate) iscrowd: u8,
     /// The complete (amodal) mask.
     segmentation: Rle,
     /// The visible mask: pixels in which the object is the nearest of its group to the objective.
@@ -82,6 +83,9 @@ pub(crate) struct Annotation {
     class: String,
     bethesda: String,
     traits: Traits,
+    /// Class in semantic segmentation.
+    #[serde(default)]
+    semantic_class: String,
     cluster: u32,
     centre_um: [f64; 2],
     depth_um: f64,
@@ -96,7 +100,14 @@ pub(crate) struct Annotation {
 }
 
 impl Annotation {
-    fn new(id: u64, parent_id: Option<u64>, object: &ObjectTruth, frame: &FrameSummary, category_id: u32) -> Self {
+    fn new(
+        id: u64,
+        parent_id: Option<u64>,
+        object: &ObjectTruth,
+        frame: &FrameSummary,
+        category_id: u32,
+        is_ignored: bool,
+    ) -> Self {
         let segmentation = Rle::new(&object.amodal, frame.width, frame.height);
         let visible = match object.visible == object.amodal {
             true => segmentation.clone(),
@@ -108,7 +119,7 @@ impl Annotation {
             category_id,
             bbox: box_of(&object.amodal),
             area: object.amodal.area(),
-            iscrowd: 0,
+            iscrowd: is_ignored.into(),
             segmentation,
             visible,
             visible_area: object.visible.area(),
@@ -119,6 +130,7 @@ impl Annotation {
             class: object.class.clone(),
             bethesda: object.bethesda.clone(),
             traits: object.traits.clone(),
+            semantic_class: object.semantic_class().name().to_owned(),
             cluster: object.cluster,
             centre_um: object.centre_um,
             depth_um: object.depth_um,
@@ -237,7 +249,7 @@ pub(crate) struct Document {
 }
 
 impl Document {
-    /// Returns the document of one frame.
+    /// Returns the document of one frame. Nuclei and mimics below `min_detectability` have `iscrowd` 1.
     ///
     /// # Errors
     /// If the category of an object is not in `categories`; the error is its name.
@@ -247,6 +259,7 @@ impl Document {
         saturated: &[Mask],
         categories: &[Category],
         files: (String, Option<String>),
+        min_detectability: f64,
     ) -> Result<Self, String> {
         let parent = |object: &ObjectTruth| {
             let is_cell = |other: &ObjectTruth| other.part == Part::Cytoplasm && other.id == object.id;
@@ -255,7 +268,8 @@ impl Document {
         let annotation = |(id, object): (u64, &ObjectTruth)| {
             let name = category_name(&object.class, object.part);
             let category = categories.iter().find(|c| c.name == name).ok_or(name)?;
-            Ok(Annotation::new(id, parent(object).map(|(id, _)| id), object, frame, category.id))
+            let is_ignored = object.is_ignored(min_detectability);
+            Ok(Annotation::new(id, parent(object).map(|(id, _)| id), object, frame, category.id, is_ignored))
         };
         Ok(Self {
             info: Info::default(),

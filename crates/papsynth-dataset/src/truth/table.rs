@@ -141,7 +141,7 @@ impl Cell {
 pub(crate) type Named = (Head, fn(&Row) -> Cell);
 
 /// The columns of the table of a frame.
-const COLUMNS: [Named; 28] = [
+const COLUMNS: [Named; 29] = [
     (Head::new("image", Kind::Whole), |row| Cell::Whole(row.image)),
     (Head::new("id", Kind::Id), |row| Cell::Id(row.object.id)),
     (Head::new("part", Kind::Text), |row| Cell::text(part(row.object.part))),
@@ -149,6 +149,7 @@ const COLUMNS: [Named; 28] = [
     (Head::new("class", Kind::Text), |row| Cell::text(&row.object.class)),
     (Head::new("bethesda", Kind::Text), |row| Cell::text(&row.object.bethesda)),
     (Head::new("traits", Kind::Text), |row| Cell::text(row.object.traits.to_string())),
+    (Head::new("semantic_class", Kind::Text), |row| Cell::text(row.object.semantic_class().name())),
     (Head::new("cluster", Kind::Id), |row| Cell::Id(row.object.cluster)),
     (Head::new("centre_x_um", Kind::Number), |row| Cell::Number(row.object.centre_um[0])),
     (Head::new("centre_y_um", Kind::Number), |row| Cell::Number(row.object.centre_um[1])),
@@ -167,10 +168,10 @@ const COLUMNS: [Named; 28] = [
     (Head::new("centroid_y_px", Kind::Number).or_null(), |row| centroid(row, 1)),
     (Head::new("truncated", Kind::Flag), |row| Cell::Flag(row.object.truncated)),
     (Head::new("best_plane", Kind::Whole).or_null(), |row| {
-        best(row).map_or(Cell::Nothing, |plane| Cell::Whole(plane as u64))
+        row.object.best_plane().map_or(Cell::Nothing, |plane| Cell::Whole(plane as u64))
     }),
     (Head::new("best_detectability", Kind::Number).or_null(), |row| {
-        best(row).map_or(Cell::Nothing, |plane| Cell::Number(row.object.detectability[plane]))
+        row.object.best_detectability().map_or(Cell::Nothing, Cell::Number)
     }),
     (Head::new("defocus_um", Kind::List(&Kind::Number)), |row| Cell::numbers(&row.object.defocus_um)),
     (Head::new("detectability", Kind::List(&Kind::Number)), |row| Cell::numbers(&row.object.detectability)),
@@ -283,10 +284,4 @@ fn bounds(row: &Row, side: fn(Bounds) -> u32) -> Cell {
 
 fn centroid(row: &Row, axis: usize) -> Cell {
     row.object.amodal.centroid().map_or(Cell::Nothing, |c| Cell::Number(c[axis]))
-}
-
-/// Returns the plane with the largest detectability; the first of equal ones.
-fn best(row: &Row) -> Option<usize> {
-    let detectability = &row.object.detectability;
-    (0..detectability.len()).reduce(|best, i| if detectability[i] > detectability[best] { i } else { best })
 }

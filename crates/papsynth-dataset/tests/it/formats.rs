@@ -269,6 +269,39 @@ fn flat_labels_follow_the_policy_and_occluded_pixels_are_recorded() {
 }
 
 #[test]
+fn nuclei_and_mimics_below_the_minimum_of_the_detectability_are_ignored() {
+    // In the order of objects: cytoplasm and nucleus of two cells, a leukocyte, a speckle. The nuclei have a
+    // detectability of 7.7 and 4.3, the leukocyte has 5.6.
+    for (least, ignored) in
+        [(0.0, [0; 6]), (5.0, [0, 0, 0, 1, 0, 0]), (7.0, [0, 0, 0, 1, 1, 0]), (8.0, [0, 1, 0, 1, 1, 0])]
+    {
+        let layout = Layout { min_detectability: least, ..Layout::new([Format::Folder, Format::Webdataset]) };
+        let [written, converted] =
+            ["written", "converted"].map(|name| Scratch::new(&format!("ignored-{name}-{least}")));
+        let frames = [frame(0, 1, 8, 1)];
+        write(written.path(), &layout, &frames);
+        let crowds = |scratch: &Scratch| -> Vec<Value> {
+            let coco = fs::read(scratch.join("shards/000000.coco.json")).unwrap();
+            let coco: Value = serde_json::from_slice(&coco).unwrap();
+            let annotations = coco["annotations"].as_array().unwrap();
+            annotations.iter().map(|annotation| annotation["iscrowd"].clone()).collect()
+        };
+        assert_eq!(crowds(&written), ignored, "{least}");
+        let classes = GreyImage::read(&written.join("labels/semantic/000000.png"), &Limits::default()).unwrap();
+        let truth = &frames[0].finished.truth;
+        for (object, ignored) in truth.objects.iter().zip(ignored).filter(|(o, _)| o.group() != Group::Cytoplasm) {
+            let expected = if ignored == 1 { 255 } else { object.semantic_class().number().into() };
+            assert!(object.amodal.pixels(WIDTH).all(|pixel| classes.grey[pixel] == expected), "{}", object.class);
+        }
+        assert!(verify(written.path(), Some(0..1)).unwrap().findings.is_empty());
+        // A conversion applies its own minimum.
+        let other = Layout { min_detectability: 5.0, ..Layout::new([Format::YoloSeg]) };
+        to(written.path(), converted.path(), &other).unwrap();
+        assert_eq!(crowds(&converted), [0, 0, 0, 1, 0, 0]);
+    }
+}
+
+#[test]
 fn samples_of_a_tar_file_are_consecutive_and_have_image_ground_truth_and_labels() {
     let scratch = Scratch::new("samples");
     let layout = Layout { frames_per_shard: 4, ..Layout::new([Format::Webdataset]) };

@@ -105,7 +105,7 @@ fn frames_with_a_missing_truncated_or_changed_file_are_incomplete() {
         fs::write(&path, bytes).unwrap();
         count += 1;
     }
-    assert_eq!(count, if cfg!(feature = "parquet") { 10 } else { 9 });
+    assert_eq!(count, if cfg!(feature = "parquet") { 11 } else { 10 });
     write(&dataset, 0);
     assert_eq!(contents(scratch.path()), files);
 }

@@ -10,7 +10,7 @@ use std::io::BufReader;
 use crate::support::{HEIGHT, SEED, Scratch, WIDTH, colour_frame, contents, frame, recipe};
 use papsynth::Frame;
 use papsynth::model::Model;
-use papsynth::truth::Group;
+use papsynth::truth::{Group, MIN_DETECTABILITY, SemanticClass};
 use papsynth_dataset::read::{GreyImage, Limits, read_label_map};
 use papsynth_dataset::{Check, Dataset, DatasetInfo, FrameSummary, Layout, RgbImage, ShardRecord, rle};
 use serde_json::Value;
@@ -61,6 +61,10 @@ fn check_labels(scratch: &Scratch, frame: &Frame) {
     let layers = read_label_map(&scratch.join(&format!("labels/layers/{name}")), &Limits::default()).unwrap();
     let expected: Vec<u32> = frame.finished.truth.layers().iter().map(|&n| n.into()).collect();
     assert_eq!(layers.ids, expected);
+    let path = scratch.join(&format!("labels/semantic/{:06}.png", frame.finished.scene.key.index));
+    let classes = GreyImage::read(&path, &Limits::default()).unwrap();
+    let expected = frame.finished.truth.semantic(&SemanticClass::ALL, MIN_DETECTABILITY);
+    assert_eq!((classes.white, classes.grey), (255, expected.into_iter().map(u16::from).collect()));
 }
 
 #[test]
@@ -220,6 +224,8 @@ fn ground_truth_is_the_same_in_masks_tables_and_labels() {
         assert_eq!(get(i, "area_px"), object.amodal.area().to_string());
         assert_eq!(get(i, "visible_area_px"), object.visible.area().to_string());
         assert_eq!(get(i, "traits"), object.traits.to_string());
+        assert_eq!(get(i, "semantic_class"), object.semantic_class().name());
+        assert_eq!(annotations[i]["semantic_class"], object.semantic_class().name());
         assert_eq!(get(i, "truncated"), object.truncated.to_string());
         assert_eq!(get(i, "depth_um").parse(), Ok(object.depth_um));
         let list: Vec<f64> = get(i, "detectability").split(';').map(|v| v.parse().unwrap()).collect();

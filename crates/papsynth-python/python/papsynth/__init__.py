@@ -16,14 +16,18 @@ from ._calibrate import calibrate_camera, calibrate_microscope
 from ._dataset import Dataset, IterableDataset
 from ._errors import FieldError, RecipeError
 from ._learn import judge, learn, match
-from ._native import Engine, Frame
+from ._native import IGNORED, MIMICS, MIN_DETECTABILITY, SEMANTIC_CLASSES, Engine, Frame
 from ._native import recipe_schema as _recipe_schema
 from ._native import resolve as _resolve
 from ._render import render
 from ._sets import generate, merge, missing, verify
-from ._target import detection_target
+from ._target import detection_target, semantic_target
 
 __all__ = [
+    "IGNORED",
+    "MIMICS",
+    "MIN_DETECTABILITY",
+    "SEMANTIC_CLASSES",
     "Dataset",
     "Engine",
     "FieldError",
@@ -49,6 +53,7 @@ __all__ = [
     "recipe",
     "render",
     "schema",
+    "semantic_target",
     "texture",
     "verify",
 ]

@@ -39,7 +39,8 @@ class Dataset:
     start : int
         Index of the first image.
     transform : callable, optional
-        Function of a `Frame` that returns the sample. Default: the frame.
+        Function of a `Frame` that returns the sample. Default: the frame. `papsynth.semantic_target` and
+        `papsynth.detection_target` return targets in which nuclei that cannot be seen are ignored.
     model : None, dict, str or os.PathLike
         As for `papsynth.render`.
     """

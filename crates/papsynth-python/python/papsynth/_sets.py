@@ -23,7 +23,7 @@ def _list(names: str | Sequence[str] | None) -> list[str] | None:
     return [names] if isinstance(names, str) else None if names is None else list(names)
 
 
-_OPTIONS = ("formats", "frames_per_shard", "without", "scenes", "threads", "verify", "model")
+_OPTIONS = ("formats", "frames_per_shard", "without", "scenes", "threads", "verify", "min_detectability", "model")
 
 
 def shard_count(recipe: Any, frames: int, options: dict[str, Any]) -> int:
@@ -88,6 +88,7 @@ def generate(
     verify: bool = False,
     model: Any = None,
     progress: Callable[[int], object] | None = None,
+    min_detectability: float = _native.MIN_DETECTABILITY,
 ) -> dict[str, int]:
     """Generate the missing frames of a data set, or those of one task.
 
@@ -111,8 +112,8 @@ def generate(
     frames_per_shard : int, optional
         Number of frames per shard.
     without : str or list of str, optional
-        Files to leave out, as for `--without`: ``"noise-free"``, ``"layers"``, ``"labels"``, ``"preview"``,
-        ``"contact-sheet"``.
+        Files to leave out, as for `--without`: ``"noise-free"``, ``"layers"``, ``"labels"``, ``"semantic"``,
+        ``"preview"``, ``"contact-sheet"``.
     scenes : bool
         Also write the scene of each frame to ``scenes/NNNNNN.json``, which `papsynth.render` reads.
     threads : int
@@ -123,6 +124,9 @@ def generate(
         As for `papsynth.render`.
     progress : callable, optional
         Called with the index of each finished frame.
+    min_detectability : float
+        Least detectability of nuclei and mimics that are not ignored, as for `papsynth.semantic_target`. Ignored
+        objects have ``iscrowd`` 1 in COCO and 255 in ``labels/semantic``.
 
     Returns
     -------
@@ -151,6 +155,7 @@ def generate(
         threads=threads,
         verify=verify,
         progress=progress,
+        min_detectability=min_detectability,
     )
 
 

@@ -45,7 +45,8 @@ def generate(
     progress : callable, optional
         Called with the number of complete shards and their total number, including shards of earlier calls.
     **options
-        As for `papsynth.generate`: formats, frames_per_shard, without, scenes, threads, verify, model.
+        As for `papsynth.generate`: formats, frames_per_shard, without, scenes, threads, verify,
+        min_detectability, model.
 
     Returns
     -------

@@ -40,7 +40,7 @@ pub(crate) fn visible_masks_in(objects: &[(u32, f64, &Mask)], width: usize, ids:
 }
 
 /// Applies a function to every pixel of a mask.
-fn paint<T>(mask: &Mask, width: usize, image: &mut [T], visit: impl Fn(&mut T)) {
+pub(super) fn paint<T>(mask: &Mask, width: usize, image: &mut [T], visit: impl Fn(&mut T)) {
     for run in mask.runs() {
         let row = run.y as usize * width;
         image[row + run.x0 as usize..row + run.x1 as usize].iter_mut().for_each(&visit);

@@ -6,6 +6,7 @@ mod labels;
 mod mask;
 mod object;
 pub(crate) mod part;
+mod semantic;
 pub(crate) mod traits;
 
 pub(crate) use labels::visible_masks_in;
@@ -14,4 +15,5 @@ pub use mask::{Bounds, Mask, Run};
 pub(crate) use object::merge_layers;
 pub use object::{ObjectTruth, Truth};
 pub use part::{COVERED, Group, Part};
+pub use semantic::{IGNORED, MIN_DETECTABILITY, SemanticClass};
 pub use traits::{Trait, Traits, UnknownTrait};

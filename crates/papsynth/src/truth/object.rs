@@ -54,6 +54,19 @@ impl ObjectTruth {
         self.tint.map_or("", Tint::name)
     }
 
+    /// Returns the plane with the largest detectability, the first of equal ones; `None` without planes.
+    #[must_use]
+    pub fn best_plane(&self) -> Option<usize> {
+        let values = &self.detectability;
+        (0..values.len()).reduce(|best, plane| if values[plane] > values[best] { plane } else { best })
+    }
+
+    /// Returns the largest detectability of all planes; `None` without planes.
+    #[must_use]
+    pub fn best_detectability(&self) -> Option<f64> {
+        self.best_plane().map(|plane| self.detectability[plane])
+    }
+
     /// Returns the group within which the visible mask is computed.
     #[must_use]
     pub fn group(&self) -> Group {

@@ -51,9 +51,10 @@ struct Object<'a> {
     frame: &'a FrameSummary,
     truth: &'a ObjectTruth,
     category: u64,
+    is_ignored: bool,
 }
 
-const OBJECT: [ObjectColumn; 18] = [
+const OBJECT: [ObjectColumn; 20] = [
     (head("id", Kind::Id), |o| Cell::Id(o.truth.id)),
     (head("part", Kind::Text), |o| Cell::text(part(o.truth.part))),
     (head(CLASS, Kind::Whole), |o| Cell::Whole(o.category)),
@@ -61,6 +62,8 @@ const OBJECT: [ObjectColumn; 18] = [
     (head("class", Kind::Text), |o| Cell::text(&o.truth.class)),
     (head("bethesda", Kind::Text), |o| Cell::text(&o.truth.bethesda)),
     (head("traits", Kind::Text), |o| Cell::text(o.truth.traits.to_string())),
+    (head("semantic_class", Kind::Text), |o| Cell::text(o.truth.semantic_class().name())),
+    (head("ignored", Kind::Flag), |o| Cell::Flag(o.is_ignored)),
     (head("cluster", Kind::Id), |o| Cell::Id(o.truth.cluster)),
     (head("bbox", Kind::List(&Kind::Whole)), |o| {
         let bounds = o.truth.amodal.bounds().map_or([0; 4], |b| [b.x, b.y, b.width, b.height]);
@@ -97,7 +100,7 @@ fn objects(field: &Field) -> Cell {
     let objects = field.truth.objects.iter().zip(&document.annotations).map(|(truth, annotation)| {
         let category = document.categories.iter().position(|category| category.id == annotation.category_id);
         let category = category.expect("annotations have categories of their document") as u64;
-        let object = Object { frame, truth, category };
+        let object = Object { frame, truth, category, is_ignored: annotation.iscrowd == 1 };
         Cell::Struct(OBJECT.iter().map(|(_, cell)| cell(&object)).collect())
     });
     Cell::List(objects.collect())

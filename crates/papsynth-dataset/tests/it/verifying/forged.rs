@@ -152,6 +152,7 @@ fn inconsistent_files_with_correct_hashes_are_found() {
     // Floating-point labels, and labels of another group, policy or frame.
     forgeries.push(("labels/nucleus/000001.tif", of("noise-free/000001.tif").to_vec()));
     forgeries.push(("labels/nucleus/000001.tif", of("labels/cytoplasm/000001.tif").to_vec()));
+    forgeries.push(("labels/semantic/000000.png", of("labels/semantic/000001.png").to_vec()));
     forgeries.push(("labels/layers/000000.tif", of("labels/layers/000001.tif").to_vec()));
     forgeries.push(("ome-tiff/000001.nucleus.ome.tif", of("ome-tiff/000001.debris.ome.tif").to_vec()));
     forgeries.push(("cellpose/nucleus/000001_masks.tif", of("cellpose/nucleus/000000_masks.tif").to_vec()));
@@ -164,6 +165,8 @@ fn inconsistent_files_with_correct_hashes_are_found() {
     forgeries.push((&yolo.0, yolo.1.split_inclusive(|&b| b == b'\n').skip(1).flatten().copied().collect()));
     forgeries.push(("qupath/000000.geojson", replaced(of("qupath/000000.geojson"), "\"cell\"", "\"annotation\"")));
     forgeries.push(("objects/000000.csv", replaced(of("objects/000000.csv"), "NILM", "HSIL")));
+    forgeries.push((coco, replaced(of(coco), "\"iscrowd\":0", "\"iscrowd\":1")));
+    forgeries.push((coco, replaced(of(coco), "\"semantic_class\":\"nucleus\"", "\"semantic_class\":\"shred\"")));
     // COCO: a truncated mask; wrong boxes, areas, visible masks, parents and categories.
     let text = String::from_utf8(of(coco).to_vec()).unwrap();
     let first = |key: &str, until: char| {
