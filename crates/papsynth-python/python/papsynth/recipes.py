@@ -213,9 +213,14 @@ class CameraSection(Section):
     dsnu_e: Number | None = None
     """Dark signal non-uniformity: standard deviation of the pixels' offsets. From 0 to 100000 electrons."""
 
+    sensor_dust: Number | None = None
+    """Number of specks of dust on or in front of the sensor per million pixels of the image. All images have the same
+    specks. From 0 to 10000.
+    """
+
     serial: int | None = None
-    """Serial number of the camera, the seed of its fixed-pattern noise. All images have the same pattern. From 0 to
-    9007199254740992.0.
+    """Serial number of the camera, the seed of its fixed-pattern noise and of the dust on its sensor. All images have the
+    same pattern. From 0 to 9007199254740992.0.
     """
 
     exposure_s: Number | None = None

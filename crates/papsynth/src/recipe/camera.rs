@@ -68,7 +68,11 @@ section! {
         prnu: Number = 0.007, 0..=0.5;
         /// Dark signal non-uniformity: standard deviation of the pixels' offsets.
         dsnu_e: Number = 2.0, 0..=100000, "electrons";
-        /// Serial number of the camera, the seed of its fixed-pattern noise. All images have the same pattern.
+        /// Number of specks of dust on or in front of the sensor per million pixels of the image. All images have the
+        /// same specks.
+        sensor_dust: Number = 0.0, 0..=10000;
+        /// Serial number of the camera, the seed of its fixed-pattern noise and of the dust on its sensor. All images
+        /// have the same pattern.
         serial: u64 = 1, 0..=9007199254740992.0;
         /// Exposure time, over which dark current accumulates. The light is given by `background.level`.
         exposure_s: Number = 0.02, 0..=1000000, "seconds";

@@ -90,7 +90,7 @@ impl Recipe {
             };
         }
         take!(nucleus.edge_um, nucleus.clumping, cytoplasm.rim_um);
-        take!(camera.prnu, camera.full_well_e, camera.glare_subtracted, camera.read_noise_e);
+        take!(camera.prnu, camera.full_well_e, camera.glare_subtracted, camera.read_noise_e, camera.sensor_dust);
         take!(stain.slide_cytoplasm, stain.slide_nucleus, stain.field_texture);
         self
     }

@@ -35,7 +35,7 @@ const RANGES: &[(&str, f64, f64)] = &[
     ("extra_blur_um", 0.0, 10.0), ("stray_light", 0.0, 0.5), ("oversampling", 1.0, 4.0), ("slab_um", 0.1, 10.0),
     ("directions", 1.0, 65_536.0), ("sigma_xy_um", 0.0, 20.0), ("sigma_z_um_per_um", 0.0, 10.0), ("feather_um", 0.0, 5.0),
     ("bits", 8.0, 16.0), ("full_well_e", 10.0, 1e7), ("read_noise_e", 0.0, 1e5), ("read_noise_rms_e", 0.0, 1e5),
-    ("offset_dn", 0.0, 32_768.0), ("glare_subtracted", 0.0, 0.8), ("prnu", 0.0, 0.5), ("dsnu_e", 0.0, 1e5),
+    ("offset_dn", 0.0, 32_768.0), ("glare_subtracted", 0.0, 0.8), ("prnu", 0.0, 0.5), ("dsnu_e", 0.0, 1e5), ("sensor_dust", 0.0, 1e4),
     ("exposure_s", 0.0, 1e6), ("dark_current_e_per_s", 0.0, 1e6), ("dark_reference_c", -200.0, 150.0),
     ("temperature_c", -200.0, 150.0), ("dark_doubling_c", 0.1, 100.0), ("blooming", 0.0, 1.0),
     ("blooming_vertical", 0.0, 1.0), ("binning_px", 1.0, 8.0), ("jpeg_quality", 0.0, 100.0),

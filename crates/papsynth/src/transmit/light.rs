@@ -6,6 +6,7 @@ use perlin_bg::{Background, BackgroundParams, BackgroundTexture, FractalParams, 
 use rand_core::Rng;
 
 use super::bright_field::PatchBuffers;
+use super::sensor_dust;
 use crate::error::ErrorKind;
 use crate::phantom::Phantom;
 use crate::scene::{Scene, SceneIllumination};
@@ -62,6 +63,7 @@ impl LightBuffers {
         let view = scene.view;
         self.empty_log10.resize(view.width * view.height, 0.0);
         background(scene)?.log10_into(&mut self.empty_log10, view.width, [0, 0]);
+        sensor_dust::add(&mut self.empty_log10, view.width, &scene.camera);
         self.channels.resize(scene.channels(), Vec::new());
         Ok(())
     }

@@ -10,6 +10,7 @@ mod gaussian;
 mod light;
 mod object_transmission;
 mod overlap;
+mod sensor_dust;
 
 use optics_psf::{Border, Gaussian};
 use portable_numerics::elementary::exp10_from;
