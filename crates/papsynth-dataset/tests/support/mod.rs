@@ -100,6 +100,7 @@ pub(crate) fn scene(index: u64, planes: usize, bits: u32) -> Scene {
             read_noise_rms_e: 0.0,
             offset_dn: 0.0,
             glare_subtracted: 0.0,
+            sensor_dust: 0.0,
             photon_noise: PhotonNoise::Exact,
             prnu: 0.0,
             dsnu_e: 0.0,
