@@ -34,7 +34,7 @@ const STEPS: [Step; 14] = [
 
 /// Steps with heavy crates, heavy readers, other processors and packaging; at most 80 minutes including the steps
 /// above.
-const FULL: [Step; 10] = [
+const FULL: [Step; 11] = [
     ("licences", |workspace| supply::deny(workspace, &[])),
     ("heavy lints", |workspace| lints(workspace.cargo_heavy(&["clippy"]))),
     ("heavy docs", |workspace| documentation(workspace.cargo_heavy(&["doc"]))),
@@ -43,6 +43,7 @@ const FULL: [Step; 10] = [
     ("every reader", |workspace| external::run(workspace, true)),
     ("packages", supply::publish),
     ("python package", package::run),
+    ("training scripts", package::training),
     ("cluster", package::cluster),
     ("processors", |workspace| hashes::run(workspace, false, true)),
 ];

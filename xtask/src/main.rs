@@ -154,6 +154,11 @@ enum DevCommand {
     ///
     /// Writes the wheel to target/wheels.
     Python,
+    /// Trains every network of crates/papsynth-python/examples for a few steps
+    ///
+    /// U-Nets, SegFormer, Mask R-CNN, Cellpose and StarDist start from random weights on small fields; the loss must
+    /// fall. No weights are downloaded. The packages need 9 GB in target/python.
+    Training,
     /// Generates a data set with Ray, Dask and Slurm and in an object store, while workers, drivers and daemons are
     /// killed
     ///
@@ -220,6 +225,7 @@ fn run(command: DevCommand) -> Result<()> {
         DevCommand::Deny { .. } => supply::deny(workspace, &words),
         DevCommand::Sbom => supply::sbom(workspace),
         DevCommand::Python => package::run(workspace),
+        DevCommand::Training => package::training(workspace),
         DevCommand::Cluster => package::cluster(workspace),
         DevCommand::Releases => package::releases(workspace),
         DevCommand::Ci { full } => ci::run(workspace, full),

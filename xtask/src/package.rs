@@ -7,7 +7,7 @@ use std::process::Command;
 use anyhow::{Context, Result, ensure};
 
 use crate::python;
-use crate::shell::{self, skipped};
+use crate::shell::{self, Skipped, skipped};
 use crate::workspace::Workspace;
 
 const BUILDER: &str = "maturin>=1.9,<2\nziglang\n";
@@ -15,6 +15,23 @@ const BUILDER: &str = "maturin>=1.9,<2\nziglang\n";
 const TESTERS: &str = "numpy\npillow\npytest\nscipy\nscikit-learn\n";
 
 const ENGINES: &str = "numpy\nray\ndask[distributed]\nboto3\nmoto[server]\n";
+
+/// Environments of the training scripts: name, packages, and scripts as PAPSYNTH_TRAINERS. Cellpose 4 cannot start from
+/// random weights.
+const TRAINERS: [(&str, &str, &str); 2] = [
+    (
+        "training-torch",
+        "torch\ntorchvision\nmonai\ntransformers\naccelerate\ncellpose>=3.1,<4\nnumpy\npytest\n",
+        "unet,monai,segformer,mask_rcnn,cellpose",
+    ),
+    (
+        "training-stardist",
+        "stardist>=0.9\nnumpy\npytest\n\
+        tensorflow-cpu; sys_platform == 'linux' and platform_machine == 'x86_64'\n\
+        tensorflow; sys_platform != 'linux' or platform_machine != 'x86_64'\n",
+        "stardist",
+    ),
+];
 
 /// Target of the static program.
 const STATIC_TARGET: &str = "x86_64-unknown-linux-musl";
@@ -55,6 +72,29 @@ fn test(workspace: &Workspace, wheel: &Path, program: &Path) -> Result<()> {
     pytest.args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]).args(tests);
     // Outside the source folder, so that the installed package is imported.
     shell::run(pytest.env("PAPSYNTH", program).env("PYTHONDONTWRITEBYTECODE", "1").current_dir(&workspace.target))
+}
+
+/// Runs every training script for a few steps. Both environments are tried, also if the first cannot be installed.
+pub(crate) fn training(workspace: &Workspace) -> Result<()> {
+    let wheel = wheel(workspace, "wheels", &[])?;
+    let test = workspace.root.join(PACKAGE).join("tests/test_training.py");
+    let mut missing = Ok(());
+    for (name, packages, scripts) in TRAINERS {
+        let python = match installed(workspace, name, packages, &wheel) {
+            Ok(python) => python,
+            Err(reason) if reason.is::<Skipped>() => {
+                missing = Err(reason);
+                continue;
+            }
+            Err(error) => return Err(error),
+        };
+        let mut pytest = Command::new(python);
+        pytest.args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]).arg(&test);
+        // With more threads, PyTorch competes with the processes that generate fields.
+        pytest.envs([("PAPSYNTH_TRAINERS", scripts), ("OMP_NUM_THREADS", "1"), ("HF_HUB_OFFLINE", "1")]);
+        shell::run(pytest.env("PYTHONDONTWRITEBYTECODE", "1").current_dir(&workspace.target))?;
+    }
+    missing
 }
 
 pub(crate) fn cluster(workspace: &Workspace) -> Result<()> {

@@ -1,6 +1,10 @@
-"""Tests of the example scripts. PAPSYNTH_REFERENCE is an optional folder of real fields."""
+"""Tests of the example scripts and of the code in README.md.
+
+PAPSYNTH_REFERENCE is an optional folder of real fields.
+"""
 
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -44,3 +48,15 @@ def test_small_tasks_lose_least_to_slow_workers():
     table = plan.main(200_000, 50)
     tasks = sorted(table)
     assert table[tasks[-1]] < table[tasks[0]] and 1 <= table[tasks[-1]] < 1.5
+
+
+def test_the_code_of_the_readme_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
+    # `python torch` runs in test_training.py; `python cluster` needs a cluster.
+    blocks = re.findall(r"^```python\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
+    names = {}
+    for block in blocks:
+        exec(compile(block, "README.md", "exec"), names)
+    assert len(blocks) == 3 and (tmp_path / "moved.png").exists()
+    assert set(names["detections"][0]) == {"boxes", "labels", "masks", "area", "iscrowd", "image_id"}
