@@ -57,7 +57,7 @@ fn the_strength_of_texture_varies_only_with_thickness_without_variation() {
         let deviation = |cell: &CellBody| {
             let kind = kinds.iter().find(|kind| kind.name == cell.textures[0]).unwrap();
             let thickness = cell.cytoplasm_absorbance / model.classes[&cell.class].cytoplasm.absorbance.median;
-            (cell.detail.texture * thickness.sqrt() / kind.strength.median).ln()
+            libm::log(cell.detail.texture * thickness.sqrt() / kind.strength.median)
         };
         let of_cells: Vec<f64> = cells.iter().filter(|cell| cell.class == "intermediate").map(deviation).collect();
         assert!(of_cells.len() > 100, "{}", of_cells.len());
