@@ -235,6 +235,7 @@ impl Page {
         match line.words[0].as_str() {
             "papsynth" => self.papsynth(line),
             "cargo" => cargo(&line.words[1..]),
+            "python" => python_script(&line.words[1]),
             // A variable of the environment.
             "export" => (),
             // The tasks of the script that `papsynth submit` printed.
@@ -361,6 +362,11 @@ fn shrink(words: &mut Vec<String>, smaller: &Smaller) {
     let at = words.iter().position(|word| word == "--set").unwrap_or(words.len());
     let inserted = smaller.inserted.iter().flat_map(|options| options.split_whitespace()).map(str::to_owned);
     words.splice(at..at, inserted);
+}
+
+/// Checks that a script of the Python package exists; the tests of the package run it.
+fn python_script(path: &str) {
+    assert!(workspace().join("crates/papsynth-python").join(path).is_file(), "there is no script {path}");
 }
 
 /// Checks a command of Cargo: that xtask has the command, or that the package to install has the features.
