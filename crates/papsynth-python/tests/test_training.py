@@ -16,7 +16,7 @@ import pytest
 PACKAGE = Path(__file__).parent.parent
 sys.path.insert(0, str(PACKAGE / "examples"))
 
-STEPS = {"unet": 30, "monai": 30, "segformer": 30, "mask_rcnn": 12, "cellpose": 80, "stardist": 40}
+STEPS = {"unet": 30, "monai": 30, "segformer": 30, "mask_rcnn": 12, "cellpose": 40, "stardist": 40}
 INSTALLED = [name for name in os.environ.get("PAPSYNTH_TRAINERS", "").split(",") if name]
 
 
