@@ -33,6 +33,8 @@ OUTLINER = dict(side=112, batch=16, fold=4, channels=(32, 64, 96, 128))
 SPOT_UM = 2.5  # standard deviation of the spots at the centres of nuclei
 PEAK = 0.4  # smallest height of a detected centre, relative to that of a spot
 APART_UM = 4  # smallest distance of two detected centres
+WRONG = 0.15  # share of examples of the outliner at places without a nucleus
+WRONG_FIELDS, WRONG_UM = 40, 6  # fields of each set in which such places are searched; smallest distance from a nucleus
 SAME = 0.7  # masks with more than this intersection over union are one cell
 SMALLEST_UM2 = 60  # area of a mask
 OUTSIDE = 0.5  # light outside the image, brighter than any light inside
@@ -144,7 +146,7 @@ def network(kind, maps):
         x = layers.MaxPool2D()(x)
     x = block(x, kind["channels"][-1])
     for channels, skip in zip(reversed(kind["channels"][:-1]), reversed(skipped)):
-        x = layers.Conv2D(channels, 3, padding="same")(layers.UpSampling2D(interpolation="bilinear")(x))
+        x = layers.Conv2D(channels, 3, padding="same")(layers.UpSampling2D()(x))
         x = block(layers.Concatenate()([x, skip]), channels)
     x = layers.Conv2D(factor**2, 1)(x)
     return tf.keras.Model(start, tf.keras.layers.Lambda(lambda y: tf.nn.depth_to_space(y, factor))(x) if factor > 1 else x)
@@ -164,7 +166,7 @@ def turned(arrays, rng):
     return [np.rot90(values[::-1] if mirrored else values, turns) for values in arrays]
 
 
-def views(field, corner, side, rng):
+def square(field, corner, side, rng):
     """Return the light of a square, altered, and where it is inside the image."""
     light = window(field["light"], corner, side, np.nan, fine=round(1 / FINE_UM))
     outside = np.isnan(light)
@@ -176,32 +178,26 @@ def finder_example(fields, rng):
     """Return input, target and weight of a random square of a field."""
     field, side = fields[rng.integers(len(fields))], FINDER["side"]
     corner = [int(rng.integers(-8, n - side + 9)) for n in field["size"]]
-    light, weight = views(field, corner, side, rng)
+    light, weight = square(field, corner, side, rng)
     light, weight, target = turned([light, weight, spots(field["centres"], corner, side)], rng)
     return inputs(light, [], FINDER["fold"]), target, weight
 
 
-def outliner_inputs(light, centres, own, corner):
-    """Return the channels of the outliner: light, the spot of its nucleus, and those of the others."""
-    side = OUTLINER["side"]
-    return light, spots([own], corner, side), spots(centres, corner, side)
-
-
 def outliner_example(fields, rng):
-    """Return input, target and weight of a random cell."""
+    """Return input, target and weight of a random cell, or of a place without a nucleus, whose mask is empty."""
     side = OUTLINER["side"]
-    while True:
-        field = fields[rng.integers(len(fields))]
-        if len(field["centres"]):
-            break
-    index = rng.integers(len(field["centres"]))
-    others = np.delete(field["centres"], index, axis=0)
+    wrong = rng.random() < WRONG and any(len(field["wrong"]) for field in fields)
+    places = "wrong" if wrong else "centres"
+    fields = [field for field in fields if len(field[places])]
+    field = fields[rng.integers(len(fields))]
+    index = rng.integers(len(field[places]))
+    others = field["centres"] if wrong else np.delete(field["centres"], index, axis=0)
     others = others[rng.random(len(others)) > 0.06]  # the finder misses some nuclei
-    at = field["centres"][index] + rng.normal(0, 1, 2)
+    at = field[places][index] + rng.normal(0, 1, 2)
     corner = [int(v) - side // 2 for v in np.rint(at)]
-    light, weight = views(field, corner, side, rng)
+    light, weight = square(field, corner, side, rng)
     maps = spots([at], corner, side), spots(others, corner, side)
-    target = placed(field["masks"][index], corner, side)
+    target = np.zeros((side, side), np.float32) if wrong else placed(field["masks"][index], corner, side)
     light, weight, target, *maps = turned([light, weight, target, *maps], rng)
     return inputs(light, maps, OUTLINER["fold"]), target, weight
 
@@ -234,14 +230,19 @@ def train(net, kind, example, sets, steps, seed, dice):
             print(f"step {number + 1} of {steps}, loss {np.mean(losses[-50:]):.4f}", flush=True)
 
 
+def probability(net, batch):
+    """Return the probability of every pixel of a batch."""
+    return 1 / (1 + np.exp(-net.predict_on_batch(np.array(batch))[..., 0]))
+
+
 def heat(finder, field):
     """Return the heat map of a field, the mean over its mirror images."""
     step = 2 ** (len(FINDER["channels"]) - 1)
     margin = [(0, -n % step * round(1 / FINE_UM)) for n in field["size"]]
     light = np.pad(field["light"].astype(np.float32), margin, constant_values=OUTSIDE)
-    found = 0
-    for part in (np.s_[:, :], np.s_[::-1, :], np.s_[:, ::-1], np.s_[::-1, ::-1]):
-        found = found + tf.sigmoid(finder(inputs(light[part], [], FINDER["fold"])[None], training=False)).numpy()[0, ..., 0][part] / 4
+    mirrored = (np.s_[:, :], np.s_[::-1, :], np.s_[:, ::-1], np.s_[::-1, ::-1])
+    maps = probability(finder, [inputs(light[part], [], FINDER["fold"]) for part in mirrored])
+    found = np.mean([values[part] for values, part in zip(maps, mirrored)], 0)
     return found[: field["size"][0], : field["size"][1]]
 
 
@@ -253,6 +254,16 @@ def peaks(found):
     return np.argwhere(tops).astype(float)
 
 
+def find_wrong(finder, fields):
+    """Store the detections of the finder that are not nuclei with each field, as examples of the outliner."""
+    for field in fields:
+        field["wrong"] = np.zeros((0, 2))
+    for field in fields[:WRONG_FIELDS]:
+        places = peaks(heat(finder, field))
+        distance = np.hypot(*np.moveaxis(places[:, None] - field["centres"][None], -1, 0))
+        field["wrong"] = places[distance.min(1, initial=np.inf) > WRONG_UM]
+
+
 def outlines(outliner, field, centres):
     """Return the probability of the cytoplasm at each of the centres, and its corner, the mean over turned and mirrored images."""
     side, fine = OUTLINER["side"], round(1 / FINE_UM)
@@ -261,16 +272,16 @@ def outlines(outliner, field, centres):
         corner = [int(v) - side // 2 for v in np.rint(centres[own])]
         light = window(field["light"], corner, side, OUTSIDE, fine)
         maps = [spots([centres[own]], corner, side), spots(np.delete(centres, own, axis=0), corner, side)]
-        ways = [(turns, mirror) for turns in range(4) for mirror in (1, -1)]
-        batch = [inputs(*((np.rot90(light[::m], t)), [np.rot90(v[::m], t) for v in maps]), OUTLINER["fold"]) for t, m in ways]
-        maps = tf.sigmoid(outliner(np.array(batch), training=False)).numpy()[..., 0]
-        found.append((corner, np.mean([np.rot90(v, -t)[::m] for v, (t, m) in zip(maps, ways)], 0)))
+        ways = [(turns, mirror) for turns in (0, 1) for mirror in (1, -1)]
+        batch = [inputs(np.rot90(light[::m], t), [np.rot90(v[::m], t) for v in maps], OUTLINER["fold"]) for t, m in ways]
+        views = zip(probability(outliner, batch), ways)
+        found.append((corner, np.mean([np.rot90(v, -t)[::m] for v, (t, m) in views], 0)))
     return found
 
 
 def cells(found, field):
     """Return the masks of the cells, with the pixels of the image; of two that are nearly the same, only the more certain one."""
-    masks = []
+    masks, kept = [], []
     certain = [float(p[p > 0.5].mean()) if (p > 0.5).sum() >= SMALLEST_UM2 else 0.0 for _, p in found]
     for index in np.argsort(certain)[::-1]:
         if certain[index] == 0:
@@ -280,9 +291,10 @@ def cells(found, field):
         low = [max(c, 0) for c in corner]
         high = [min(c + n, m) for c, n, m in zip(corner, part.shape, field["size"])]
         whole[low[0] : high[0], low[1] : high[1]] = part[tuple(slice(a - c, b - c) for a, b, c in zip(low, high, corner))]
-        mask = resized(whole, field["full"], Image.Resampling.BILINEAR) > 0.5
-        if all((mask & other).sum() <= SAME * (mask | other).sum() for other in masks):
-            masks.append(mask)
+        mask = whole > 0.5
+        if all((mask & other).sum() <= SAME * (mask | other).sum() for other in kept):
+            kept.append(mask)
+            masks.append(resized(whole, field["full"], Image.Resampling.BILINEAR) > 0.5)
     return masks
 
 
@@ -293,7 +305,7 @@ def score(masks, field):
     counts = {"field": field["name"], "cells": int(scored.sum()), "masks": len(masks)}
     if not masks or not true:
         return counts | {"dice": [], "false": len(masks)}
-    pair = [sparse.csr_matrix(np.array(values).reshape(len(values), -1), dtype=np.int64) for values in (true, masks)]
+    pair = [sparse.csr_matrix(np.array(values).reshape(len(values), -1), dtype=np.int32) for values in (true, masks)]
     areas = [np.asarray(values.sum(1)).ravel() for values in pair]
     dice = 2 * (pair[0] @ pair[1].T).toarray() / (areas[0][:, None] + areas[1][None, :])
     rows, columns = linear_sum_assignment(np.where(dice > MATCH, dice, 0), maximize=True)
@@ -314,8 +326,12 @@ def main():
     options = parser.parse_args()
     tf.keras.utils.set_random_seed(options.seed)
     sets = [load(name) for name in options.train]
+    if not all(any(len(field["centres"]) for field in fields) for fields in sets):
+        parser.error("each training set needs at least one cell with a nucleus")
     finder, outliner = network(FINDER, 0), network(OUTLINER, 2)
     train(finder, FINDER, finder_example, sets, options.finder_steps, options.seed, dice=False)
+    for fields in sets:
+        find_wrong(finder, fields)
     train(outliner, OUTLINER, outliner_example, sets, options.steps, options.seed, dice=True)
     if options.weights:
         finder.save_weights(f"{options.weights}-finder.weights.h5")
