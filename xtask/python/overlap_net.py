@@ -38,6 +38,8 @@ WRONG_FIELDS, WRONG_UM = 40, 6  # fields of each set in which such places are se
 SAME = 0.7  # masks with more than this intersection over union are one cell
 SMALLEST_UM2 = 60  # area of a mask
 OUTSIDE = 0.5  # light outside the image, brighter than any light inside
+COVERED = 0.4  # probability of the pixels of a mask, chosen on fields of `lbc`
+TURNS = (0, 1, 2, 3)  # quarter turns over which the outliner is averaged, each also mirrored
 CONTRAST = 4.0  # factor on the light
 
 
@@ -207,7 +209,7 @@ def train(net, kind, example, sets, steps, seed, dice):
     rng = np.random.default_rng(seed)
     optimizer = tf.keras.optimizers.AdamW(tf.keras.optimizers.schedules.CosineDecay(2e-3, steps, warmup_target=2e-3), weight_decay=1e-4)
 
-    @tf.function
+    @tf.function(autograph=False)
     def step(images, targets, weights):
         with tf.GradientTape() as tape:
             logits = net(images, training=True)
@@ -237,7 +239,7 @@ def probability(net, batch):
 
 def heat(finder, field):
     """Return the heat map of a field, the mean over its mirror images."""
-    step = 2 ** (len(FINDER["channels"]) - 1)
+    step = round(FINDER["fold"] * FINE_UM) * 2 ** (len(FINDER["channels"]) - 1)
     margin = [(0, -n % step * round(1 / FINE_UM)) for n in field["size"]]
     light = np.pad(field["light"].astype(np.float32), margin, constant_values=OUTSIDE)
     mirrored = (np.s_[:, :], np.s_[::-1, :], np.s_[:, ::-1], np.s_[::-1, ::-1])
@@ -272,7 +274,7 @@ def outlines(outliner, field, centres):
         corner = [int(v) - side // 2 for v in np.rint(centres[own])]
         light = window(field["light"], corner, side, OUTSIDE, fine)
         maps = [spots([centres[own]], corner, side), spots(np.delete(centres, own, axis=0), corner, side)]
-        ways = [(turns, mirror) for turns in (0, 1) for mirror in (1, -1)]
+        ways = [(turns, mirror) for turns in TURNS for mirror in (1, -1)]
         batch = [inputs(np.rot90(light[::m], t), [np.rot90(v[::m], t) for v in maps], OUTLINER["fold"]) for t, m in ways]
         views = zip(probability(outliner, batch), ways)
         found.append((corner, np.mean([np.rot90(v, -t)[::m] for v, (t, m) in views], 0)))
@@ -282,7 +284,7 @@ def outlines(outliner, field, centres):
 def cells(found, field):
     """Return the masks of the cells, with the pixels of the image; of two that are nearly the same, only the more certain one."""
     masks, kept = [], []
-    certain = [float(p[p > 0.5].mean()) if (p > 0.5).sum() >= SMALLEST_UM2 else 0.0 for _, p in found]
+    certain = [float(p[p > COVERED].mean()) if (p > COVERED).sum() >= SMALLEST_UM2 else 0.0 for _, p in found]
     for index in np.argsort(certain)[::-1]:
         if certain[index] == 0:
             break
@@ -291,10 +293,10 @@ def cells(found, field):
         low = [max(c, 0) for c in corner]
         high = [min(c + n, m) for c, n, m in zip(corner, part.shape, field["size"])]
         whole[low[0] : high[0], low[1] : high[1]] = part[tuple(slice(a - c, b - c) for a, b, c in zip(low, high, corner))]
-        mask = whole > 0.5
+        mask = whole > COVERED
         if all((mask & other).sum() <= SAME * (mask | other).sum() for other in kept):
             kept.append(mask)
-            masks.append(resized(whole, field["full"], Image.Resampling.BILINEAR) > 0.5)
+            masks.append(resized(whole, field["full"], Image.Resampling.BILINEAR) > COVERED)
     return masks
 
 
@@ -319,7 +321,7 @@ def main():
     parser.add_argument("--train", nargs="+", required=True)
     parser.add_argument("--test", nargs="+", required=True)
     parser.add_argument("--steps", type=int, default=600, help="of the outliner")
-    parser.add_argument("--finder-steps", type=int, default=300)
+    parser.add_argument("--finder-steps", type=int, default=400)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--weights", help="prefix of the files to which the weights are written")
     parser.add_argument("--out", type=Path, required=True)
