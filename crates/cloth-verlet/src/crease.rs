@@ -63,8 +63,8 @@ impl Crease {
         }
     }
 
-    /// Returns how far a point lies beyond the line, perpendicular to its direction at `point`, in the unit of the
-    /// sheet; negative before the line.
+    /// Returns how far a point lies beyond the line in the unit of the sheet; negative before the line. Distances from
+    /// a curved line are measured parallel to the axis of the parabola.
     #[must_use]
     pub fn distance_beyond(&self, point: Point) -> f64 {
         self.sheared(point)[1]
@@ -403,7 +403,7 @@ mod tests {
     }
 
     #[test]
-    fn distances_beyond_a_line_are_perpendicular_to_its_direction() {
+    fn distances_beyond_a_line_are_parallel_to_the_axis_of_the_parabola() {
         let curved = Crease { curvature: 0.02, ..CREASE };
         for [t, s] in [[0.0, 0.0], [3.0, -2.0], [-8.0, 5.0]] {
             assert!((curved.distance_beyond(curved.point_at([t, s])) - s).abs() < 1e-12);

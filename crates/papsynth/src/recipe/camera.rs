@@ -68,8 +68,8 @@ section! {
         prnu: Number = 0.007, 0..=0.5;
         /// Dark signal non-uniformity: standard deviation of the pixels' offsets.
         dsnu_e: Number = 2.0, 0..=100000, "electrons";
-        /// Number of specks of dust on or in front of the sensor per million pixels of the image. All images have the
-        /// same specks.
+        /// Number of specks of dust on or in front of the sensor per million pixels of the image. All images of the
+        /// same size have the same specks.
         sensor_dust: Number = 0.0, 0..=10000;
         /// Serial number of the camera, the seed of its fixed-pattern noise and of the dust on its sensor. All images
         /// have the same pattern.

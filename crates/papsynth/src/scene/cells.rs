@@ -207,15 +207,16 @@ fn draw_body(
     /// Largest radius of a nucleus relative to its cell: a larger one extends beyond the cell.
     const WIDEST: f64 = 0.72;
     nucleus_um = nucleus_um.min(WIDEST * radius_um);
-    let density = libm::exp(stain.cytoplasm_variation * cytoplasm.absorbance.log_sd * random::normal(rng));
-    let cytoplasm_absorbance = cytoplasm.absorbance.median * density * stain.cytoplasm * mix.cytoplasm_stain.draw(rng);
+    let thickness = libm::exp(stain.cytoplasm_variation * cytoplasm.absorbance.log_sd * random::normal(rng));
+    let cytoplasm_absorbance =
+        cytoplasm.absorbance.median * thickness * stain.cytoplasm * mix.cytoplasm_stain.draw(rng);
     let mut detail = draw_detail(recipe, cytoplasm.pliability, rng, &own);
     let mut texture_rng = own("texture");
     let textures = [0, 1].map(|_| drawn_kind(texture, stain.kind_of_texture, &mut texture_rng));
     let strength = &textures[0].strength;
     let deviation = strength.log_sd * random::normal(&mut texture_rng) + texture.field_log_sd * stain.cytoplasm_texture;
     // The texture adds up at random over the thickness, as in `phantom/cell/detail.rs`.
-    detail.texture *= strength.median * libm::exp(stain.texture_variation * deviation) / density.sqrt();
+    detail.texture *= strength.median * libm::exp(stain.texture_variation * deviation) / thickness.sqrt();
     let fold = draw_fold(recipe, cytoplasm.pliability, rng);
     let distance = (nucleus.off_centre.mean + nucleus.off_centre.sd * random::normal(rng)).clamp(0.0, 1.0);
     // The nucleus stays inside the cell.

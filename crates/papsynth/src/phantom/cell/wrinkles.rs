@@ -13,7 +13,8 @@ use crate::random;
 /// Distance between the points of a wrinkle, µm.
 const STEP_UM: f64 = 0.5;
 
-/// Fraction of wrinkles that are a rolled stretch of the rim.
+/// Fraction of wrinkles that are a rolled stretch of the rim. This and the next three numbers were set so that lines
+/// along rims are about as dark and as frequent as in real fields (docs/decisions.md, "Rolled rims").
 const ROLLED: f64 = 0.35;
 /// Thickness of a rolled stretch relative to that of a wrinkle: minimum, maximum.
 const ROLLED_THICKNESS: [f64; 2] = [0.8, 3.0];
