@@ -12,7 +12,7 @@ use crate::workspace::Workspace;
 
 const BUILDER: &str = "maturin>=1.9,<2\nziglang\n";
 
-const TESTERS: &str = "numpy\npillow\npytest\nscipy\nscikit-learn\n";
+const TESTERS: &str = "numpy\npillow\npytest\nscipy\nscikit-learn\nipython\n";
 
 const ENGINES: &str = "numpy\nray\ndask[distributed]\nboto3\nmoto[server]\n";
 
@@ -66,8 +66,8 @@ pub(crate) fn releases(workspace: &Workspace) -> Result<()> {
 
 /// Runs the tests of the package with an installed wheel and the command line program.
 fn test(workspace: &Workspace, wheel: &Path, program: &Path) -> Result<()> {
-    let tests =
-        ["test_package.py", "test_examples.py"].map(|name| workspace.root.join(PACKAGE).join("tests").join(name));
+    let tests = ["test_package.py", "test_display.py", "test_examples.py"];
+    let tests = tests.map(|name| workspace.root.join(PACKAGE).join("tests").join(name));
     let mut pytest = Command::new(installed(workspace, "package", TESTERS, wheel)?);
     pytest.args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]).args(tests);
     // Outside the source folder, so that the installed package is imported.
