@@ -152,7 +152,8 @@ enum DevCommand {
     /// Builds the Python package, installs it to a new environment, and compares its output with that of the command
     /// line
     ///
-    /// Writes the wheel to target/wheels.
+    /// Writes the wheel to target/wheels. Also tests Jupyter's pictures and tables, and the napari plugin without a
+    /// screen. napari and Qt need 1 GB in target/python; Qt's libraries are installed as root on Debian.
     Python,
     /// Trains every network of crates/papsynth-python/examples for a few steps
     ///
