@@ -187,7 +187,7 @@ impl Engine {
         self.engine.recipe().to_toml()
     }
 
-    /// Return the HTML that Jupyter shows: the preset that is closest to the recipe, and the fields that differ from it.
+    /// Return the HTML that Jupyter shows: the preset that is closest to the recipe, and the fields that differ.
     fn _repr_html_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let display = py.import("papsynth._display")?;
         display.call_method1("engine_html", (self.recipe(),))

@@ -145,7 +145,8 @@ def test_every_control_returns_the_value_of_the_recipe(app, preset):
     recipe = papsynth.recipe(preset)
     for entry in _schema.entries(recipe):
         value = _schema.value_at(recipe, entry.path)
-        assert _editors.editor(entry, value).read() == ([] if entry.kind == "list" and value is None else value), entry.name
+        expected = [] if entry.kind == "list" and value is None else value
+        assert _editors.editor(entry, value).read() == expected, entry.name
 
 
 def test_distributions_are_edited(app):
@@ -212,7 +213,8 @@ def test_a_field_is_rendered_into_layers(app, viewer, widget):
     expected = papsynth.render({**SMALL, "focus": {"planes": 3}}, LARGEST, 3)
     image, cells, nuclei = viewer.layers
     assert np.array_equal(image.data, expected.stack)
-    assert np.array_equal(cells.data, expected.labels["cytoplasm"]) and np.array_equal(nuclei.data, expected.labels["nucleus"])
+    assert np.array_equal(cells.data, expected.labels["cytoplasm"])
+    assert np.array_equal(nuclei.data, expected.labels["nucleus"])
     again = papsynth.render(image.metadata["papsynth"]["recipe"], LARGEST, 3)
     assert np.array_equal(again.stack, image.data)
 
