@@ -157,8 +157,9 @@ enum DevCommand {
     Python,
     /// Trains every network of crates/papsynth-python/examples for a few steps
     ///
-    /// U-Nets, SegFormer, Mask R-CNN, Cellpose and StarDist start from random weights on small fields; the loss must
-    /// fall. No weights are downloaded. The packages need 9 GB in target/python.
+    /// U-Nets, SegFormer, LR-ASPP, Mask R-CNN, Cellpose and StarDist start from random weights on small fields, one of
+    /// them on a data set of Hugging Face `datasets`; the loss must fall. No weights are downloaded. The packages need
+    /// 9 GB in target/python.
     Training,
     /// Generates a data set with Ray, Dask and Slurm and in an object store, while workers, drivers and daemons are
     /// killed

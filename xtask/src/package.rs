@@ -26,8 +26,8 @@ const ENGINES: &str = "numpy\nray\ndask[distributed]\nboto3\nmoto[server]\n";
 const TRAINERS: [(&str, &str, &str); 2] = [
     (
         "training-torch",
-        "torch\ntorchvision\nmonai\ntransformers\naccelerate\ncellpose>=3.1,<4\nnumpy\npytest\n",
-        "unet,monai,segformer,mask_rcnn,cellpose",
+        "torch\ntorchvision\nmonai\ntransformers\naccelerate\ndatasets\ncellpose>=3.1,<4\nnumpy\npytest\n",
+        "unet,monai,segformer,mask_rcnn,torchvision,monai_crops,datasets,cellpose",
     ),
     (
         "training-stardist",
@@ -111,6 +111,8 @@ pub(crate) fn training(workspace: &Workspace) -> Result<()> {
         pytest.args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]).arg(&test);
         // With more threads, PyTorch competes with the processes that generate fields.
         pytest.envs([("PAPSYNTH_TRAINERS", scripts), ("OMP_NUM_THREADS", "1"), ("HF_HUB_OFFLINE", "1")]);
+        // Data sets of the tests are kept out of the user's cache.
+        pytest.env("HF_HOME", workspace.target.join("python/huggingface"));
         shell::run(pytest.env("PYTHONDONTWRITEBYTECODE", "1").current_dir(&workspace.target))?;
     }
     missing
