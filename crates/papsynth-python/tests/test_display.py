@@ -147,6 +147,9 @@ def test_texts_of_recipes_are_escaped():
     recipe[attack] = {}
     text = recipe._repr_html_()
     assert "<script" not in text and "Invalid recipe" in text
+    recipe = papsynth.recipe()
+    recipe["field"]["width_px"] = object()
+    assert "Invalid recipe" in recipe._repr_html_() and "<object" not in recipe._repr_html_()
 
 
 def test_a_shown_recipe_is_a_dictionary():

@@ -86,7 +86,7 @@ class Section:
 
 
 TAIL = '''
-    def _repr_html_(self) -> str:
+    def _repr_html_(self) -> str | None:
         """Return the HTML that Jupyter shows: the fields that differ from the closest preset, or the errors."""
         from ._display import given_html
 

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from . import _native
-from ._errors import RecipeError
 from ._schema import differences, notation
 from ._toml import loads
 
@@ -100,21 +99,29 @@ def recipe_html(recipe: dict[str, Any], title: str = "Recipe") -> str:
     return text + (f"<p>{count - len(rows)} more fields differ.</p>" if count > len(rows) else "")
 
 
-def engine_html(toml: str) -> str:
-    """Return the complete recipe of an engine, in TOML, as HTML."""
-    return recipe_html(loads(toml), "Engine")
+def engine_html(toml: str) -> str | None:
+    """Return the complete recipe of an engine, in TOML, as HTML; None if this Python cannot read TOML."""
+    try:
+        return recipe_html(loads(toml), "Engine")
+    except ModuleNotFoundError:
+        return None
 
 
-def given_html(recipe: dict[str, Any]) -> str:
-    """Return a recipe as HTML, with the defaults of its omitted fields, or its errors."""
+def given_html(recipe: dict[str, Any]) -> str | None:
+    """Return a recipe as HTML, with the defaults of its omitted fields, or its errors.
+
+    Returns None, for the plain form, if this Python cannot read TOML.
+    """
     try:
         return recipe_html(loads(_native.resolve(recipe)))
-    except RecipeError as error:
+    except ModuleNotFoundError:
+        return None
+    except (TypeError, ValueError) as error:
         return f"<p><b>Invalid recipe</b>: {html.escape(str(error))}</p>"
 
 
 class RecipeDict(dict):
     """A complete recipe as a dictionary, which Jupyter shows as a table of its differences from a preset."""
 
-    def _repr_html_(self) -> str:
+    def _repr_html_(self) -> str | None:
         return given_html(self)

@@ -1543,7 +1543,7 @@ class Recipe(Section):
     each slide (`slide.fields_per_slide`). Without entries, all slides have the numbers of the recipe.
     """
 
-    def _repr_html_(self) -> str:
+    def _repr_html_(self) -> str | None:
         """Return the HTML that Jupyter shows: the fields that differ from the closest preset, or the errors."""
         from ._display import given_html
 
