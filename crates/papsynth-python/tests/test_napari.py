@@ -116,6 +116,13 @@ def test_the_planes_of_a_stack_are_the_steps_of_the_focus_slider(viewer):
     assert cells.data.shape == (240, 320)
 
 
+def test_a_fused_image_has_no_focus_slider(viewer):
+    recipe = papsynth.recipe("extended-focus")
+    frame = papsynth.render({**recipe, "field": {**recipe["field"], **SMALL["field"]}}, seed=7)
+    image, *_ = add(viewer, frame)
+    assert image.ndim == 2 and np.array_equal(image.data, frame.image)
+
+
 @pytest.mark.parametrize(("bits", "planes"), [(8, 1), (12, 1), (8, 3), (12, 3)])
 def test_colour_is_shown_as_colour(viewer, bits, planes):
     recipe = {**SMALL, "light": {"kind": "colour"}, "camera": {"bits": bits}, "focus": {"planes": planes}}
@@ -132,6 +139,8 @@ def test_sample_data_open(viewer, key):
     opened = viewer.open_sample("papsynth", key)
     assert [type(layer).__name__ for layer in opened] == ["Image", "Labels", "Labels"]
     assert len(opened[2].features) > 0 and opened[0].ndim == (3 if key == "focus-stack" else 2)
+    for labels in opened[1:]:
+        assert set(np.unique(labels.data)) - {0} <= set(labels.features["index"])
 
 
 def test_every_sample_is_tested():
