@@ -232,13 +232,16 @@ def test_a_new_field_replaces_the_last_one_unless_it_is_kept(app, viewer, widget
     change(widget, "focus.planes", "3")
     rendered(app, widget)
     first = list(viewer.layers)
-    first[1].visible, viewer.dims.current_step = False, (0, 0, 0)
-    widget._seed.value = 1
+    first[1].visible, first[2].contour, viewer.dims.current_step = False, 2, (0, 0, 0)
+    change(widget, "optics.na", "0.8")
     rendered(app, widget)
     second = list(viewer.layers)
+    assert [layer.name for layer in second] == [
+        f"lbc, seed 0, index 0: {kind}" for kind in ("image", "cells", "nuclei")
+    ]
     assert len(second) == 3 and not set(map(id, first)) & set(map(id, second))
-    assert not second[1].visible and second[2].visible and viewer.dims.current_step[0] == 0
-    widget._keep.value, widget._seed.value = True, 2
+    assert not second[1].visible and second[2].visible and second[2].contour == 2 and viewer.dims.current_step[0] == 0
+    widget._keep.value = True
     rendered(app, widget)
     assert list(viewer.layers)[:3] == second and len(viewer.layers) == 6
     viewer.layers.clear()

@@ -22,6 +22,9 @@ _WIDTH_PX = 420
 # Height of the message, pixels.
 _MESSAGE_PX = 84
 
+# Settings of a layer that the layer of the next field has, too.
+_KEPT = ("visible", "opacity", "gamma", "contour")
+
 _CHANGED = "changed fields"
 
 
@@ -238,7 +241,12 @@ class FieldWidget(Container):
         self._layers = dict(zip(("image", "cells", "nuclei"), add_data(self._viewer, made)))
         for kind, old in earlier.items():
             self._viewer.layers.remove(old)
-            self._layers[kind].visible, self._layers[kind].opacity = old.visible, old.opacity
+            for setting in _KEPT:
+                if hasattr(old, setting):
+                    setattr(self._layers[kind], setting, getattr(old, setting))
+        # Names were made unique beside those of the earlier layers.
+        for layer, (_, options, _) in zip(self._layers.values(), made):
+            layer.name = options["name"]
         new, old = self._layers["image"], earlier.get("image")
         if old is not None and _planes(old) == _planes(new):
             self._viewer.dims.point = focus
