@@ -19,7 +19,7 @@ FEATURES = Features({"index": Value("int64"), "slide": Value("int64"), "image": 
 
 
 def generate(recipe, identity, indices):
-    """Yield fields as rows. `identity` is part of the key of the cache: engines with equal identity give equal fields."""
+    """Yield fields as rows. The cache compares `identity`: engines with equal identity give equal fields."""
     for index in indices:
         frame = papsynth.render(recipe, seed=1, index=index)
         target = papsynth.semantic_target(frame, CLASSES)

@@ -1,4 +1,7 @@
-"""Tests of the napari plugin without a screen: QT_QPA_PLATFORM=offscreen, and the model of a viewer, which needs no OpenGL."""
+"""Tests of the napari plugin without a screen.
+
+Qt draws off screen (QT_QPA_PLATFORM=offscreen). Layers are added to the model of a viewer, which needs no OpenGL.
+"""
 
 import importlib
 import os
@@ -272,9 +275,10 @@ def test_the_interface_works_while_a_field_is_rendered(app, viewer, widget, monk
 def test_a_second_click_waits_for_the_first_field(app, widget):
     worker = widget.render_field()
     assert worker is not None and widget.render_field() is None and not widget._button.enabled
-    assert widget.message == "Rendering …"
+    assert widget._button.text == "Rendering …"
     while widget._worker is not None:
         app.processEvents()
+    assert widget._button.text == "Render" and widget._button.enabled
 
 
 def test_errors_are_shown_and_nothing_is_rendered(app, viewer, widget):
@@ -288,6 +292,15 @@ def test_errors_are_shown_and_nothing_is_rendered(app, viewer, widget):
     assert rendered(app, widget).startswith("Error: optics.na") and not viewer.layers
     change(widget, "optics.na", "0.9")
     assert widget.message == ""
+    assert rendered(app, widget).startswith("lbc, seed 0")
+
+
+def test_a_text_that_is_not_a_number_is_forgotten_with_its_control(app, widget):
+    change(widget, "optics.na", "x")
+    widget._section.value = "camera"
+    assert widget.message == ""
+    widget._section.value = "optics"
+    assert widget._editors["optics.na"].read() == papsynth.recipe()["optics"]["na"]
     assert rendered(app, widget).startswith("lbc, seed 0")
 
 

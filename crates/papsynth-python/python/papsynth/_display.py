@@ -38,7 +38,7 @@ def _inner_outline(labels: np.ndarray) -> np.ndarray:
 
 
 def _blocks(values: np.ndarray, side: int) -> np.ndarray:
-    """Return blocks of side × side pixels: (rows, side, columns, side[, channels]). Border pixels fill the last ones."""
+    """Return blocks of side × side pixels: (rows, side, columns, side[, channels]). The last repeat border pixels."""
     height, width = values.shape[:2]
     more = [(0, -height % side), (0, -width % side)] + [(0, 0)] * (values.ndim - 2)
     values = np.pad(values, more, mode="edge")

@@ -27,6 +27,8 @@ _KEPT = ("visible", "opacity", "gamma", "contour")
 
 _CHANGED = "changed fields"
 
+_RENDER = "Render"
+
 
 def _section(entry: Entry) -> str:
     """Return the section of a field, such as "optics" or "debris.mucus"."""
@@ -81,7 +83,7 @@ class FieldWidget(Container):
         self._form: Any = Container(name="form")
         self._reset = PushButton(name="reset_fields", text="Reset fields", tooltip="Use the preset without changes")
         self._keep = CheckBox(name="keep", text="Keep earlier layers")
-        self._button = PushButton(name="render_field", text="Render")
+        self._button = PushButton(name="render_field", text=_RENDER)
         self._message = TextEdit(name="message")
         head: Any = Container(widgets=[self._preset, self._seed, self._index, self._section, self._search], name="head")
         foot: Any = Container(widgets=[self._reset, self._keep, self._button, self._message], labels=False, name="foot")
@@ -93,7 +95,6 @@ class FieldWidget(Container):
         self._search.changed.connect(self._show)
         self._button.changed.connect(self.render_field)
         self._start()
-        self._section.value = "field"
 
     def _arrange(self) -> None:
         """Put the fields into a scroll area with the free height."""
@@ -158,6 +159,10 @@ class FieldWidget(Container):
         """Make the controls of the fields that are shown."""
         self._form.clear()
         self._editors = {}
+        if self._invalid:
+            # Texts that are not numbers are gone with their controls.
+            self._invalid = {}
+            self._check()
         shown = self._shown()
         for entry in shown:
             made = editor(entry, value_at(self._recipe, entry.path))
@@ -211,8 +216,7 @@ class FieldWidget(Container):
         if self._worker is not None or not self._check():
             return None
         given = self._recipe, self._preset.value, self._seed.value, self._index.value
-        self._button.enabled = False
-        self._message.value = "Rendering …"
+        self._button.enabled, self._button.text = False, "Rendering …"
         self._worker = create_worker(render_layers, *given, _start_thread=False)
         self._worker.returned.connect(self._finish)
         self._worker.start()
@@ -222,7 +226,7 @@ class FieldWidget(Container):
         """Show the layers or the error of the thread."""
         self._worker = None
         try:
-            self._button.enabled = True
+            self._button.enabled, self._button.text = True, _RENDER
         except RuntimeError:
             # The widget was closed during rendering, and Qt has deleted its controls.
             return
