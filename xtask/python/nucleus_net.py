@@ -31,7 +31,7 @@ SMALLEST = 60  # area of a detection, pixels
 SCALES = (1.0, 0.94)  # of the image with a mask, whose pixel size is not known exactly
 CHANNELS = 12  # of the first level of the network
 CONTRAST = 4.0  # factor on the images
-MIMICS = (4, 6)  # first and last semantic class of objects that look like nuclei: shreds, leukocytes, bare nuclei
+MIMICS = (4, 5)  # first and last semantic class of objects that look like nuclei: shreds and leukocytes
 MIMIC_CROPS = 0.35  # share of the crops that are chosen to show such objects
 NUCLEUS_WEIGHT = 3.0  # of pixels of nuclei, and of objects that look like them
 
@@ -148,12 +148,13 @@ def train(sets, steps, seed):
         optimizer.apply_gradients(zip(tape.gradient(loss, net.trainable_variables), net.trainable_variables))
         return loss
 
+    losses = []
     for number in range(steps):
         crops = [crop(sets[k % len(sets)], rng) for k in range(BATCH)]
         images, targets, weights = (np.array(values, np.float32)[..., None] for values in zip(*crops))
-        loss = float(step(images * CONTRAST, targets, weights))
+        losses.append(float(step(images * CONTRAST, targets, weights)))
         if number % 100 == 99:
-            print(f"step {number + 1} of {steps}, loss {loss:.3f}", flush=True)
+            print(f"step {number + 1} of {steps}, loss {np.mean(losses[-100:]):.3f}", flush=True)
     return net
 
 
