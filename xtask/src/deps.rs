@@ -49,6 +49,8 @@ const RULES: [(&[&str], &[&[&str]]); 15] = [
     (&["papsynth-benches"], &[TECHNIQUES, ENGINE, &["papsynth-dataset"]]),
     // Runs without files and threads; the engine does not use all techniques.
     (&["papsynth-hashes"], &[TECHNIQUES, ENGINE]),
+    // Reads files only, and runs the program.
+    (&["papsynth-site"], &[]),
     (&["xtask"], &[]),
 ];
 
