@@ -8,14 +8,20 @@ use anyhow::{Context, Result, ensure};
 use crate::page::{Group, Page};
 use crate::{Input, Pictures};
 
+/// The place of the presets in the page.
+const PRESETS: &str = "<!-- presets -->";
+
 /// Returns the page, after its pictures are rendered.
 pub(crate) fn page(input: &Input) -> Result<Page> {
-    let mut text = input.read("site/pages/gallery.md")?;
+    let around = input.read("site/pages/gallery.md")?;
+    let (before, after) = around.split_once(PRESETS).with_context(|| format!("gallery.md: expected {PRESETS}"))?;
+    let (mut list, mut text) = (String::new(), String::new());
     let work = input.out.join("gallery-work");
     for line in input.papsynth(&["init", "--list"])?.lines() {
         let (name, meaning) = line.split_once(' ').with_context(|| format!("`papsynth init --list`: {line}"))?;
         let preset = input.read(&format!("crates/papsynth/presets/{name}.toml"))?;
         let words = ["generate", "--preset", name, "--frames", "1", "--seed", "7", "--out", name];
+        list += &format!("- [{name}](#{name}): {}\n", meaning.trim());
         text += &format!("\n## {name}\n\n{}.\n\n", meaning.trim());
         if input.pictures == Pictures::Rendered {
             text += &picture(input, &work, name, &words)?;
@@ -28,7 +34,8 @@ pub(crate) fn page(input: &Input) -> Result<Page> {
     if work.exists() {
         fs::remove_dir_all(&work).with_context(|| format!("cannot remove {}", work.display()))?;
     }
-    let mut page = Page::new("gallery.html", Group::Start, "Gallery of presets", text);
+    let mut page =
+        Page::new("gallery.html", Group::Start, "Gallery of presets", format!("{before}{list}{text}{after}"));
     page.source = "site/pages/gallery.md".to_owned();
     Ok(page)
 }

@@ -61,7 +61,7 @@ pub(crate) fn html(page: &Page, pages: &[Page]) -> String {
 fn navigation(page: &Page, pages: &[Page]) -> String {
     let mut html = String::new();
     for group in Group::ALL {
-        let open = if group == page.group || group == Group::Start { " open" } else { "" };
+        let open = if group == page.group || matches!(group, Group::Start | Group::HowTo) { " open" } else { "" };
         html += &format!("<details{open}><summary>{}</summary>\n<ul>\n", group.name());
         for other in pages.iter().filter(|other| other.group == group) {
             let current = if other.path == page.path { " aria-current=\"page\"" } else { "" };
@@ -77,9 +77,10 @@ fn navigation(page: &Page, pages: &[Page]) -> String {
 pub(crate) fn search(pages: &[Page]) -> Result<String> {
     let mut entries = Vec::new();
     for page in pages {
-        entries.push([page.title.clone(), page.path.clone(), page.group.name().to_owned()]);
-        for (anchor, text) in &page.headings {
-            entries.push([text.clone(), format!("{}#{anchor}", page.path), page.title.clone()]);
+        entries.push([page.title.clone(), page.path.clone(), page.group.name().to_owned(), String::new()]);
+        for heading in &page.headings {
+            let address = format!("{}#{}", page.path, heading.anchor);
+            entries.push([heading.text.clone(), address, page.title.clone(), heading.meaning.clone()]);
         }
     }
     Ok(format!("window.papsynthPages = {};\n", serde_json::to_string(&entries)?))

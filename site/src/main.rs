@@ -20,7 +20,6 @@ use std::process::{Command, ExitCode, Stdio};
 
 use anyhow::{Context, Result, bail, ensure};
 
-
 /// The file that marks a folder as a site, which may be replaced.
 const MARK: &str = "papsynth-site.txt";
 

@@ -6,7 +6,7 @@ use std::fs;
 use anyhow::{Context, Result, bail, ensure};
 use pulldown_cmark::{BrokenLink, CodeBlockKind, CowStr, Event, Options, Parser, Tag, TagEnd, html::push_html};
 
-use crate::page::{Body, Page, folder, join};
+use crate::page::{Body, Heading, Page, folder, join};
 use crate::{Input, write};
 
 /// Address of a link to an item of Rust, which the site does not have.
@@ -32,7 +32,7 @@ pub(crate) fn html(input: &Input, page: &Page, sources: &BTreeMap<String, String
             let anchor = unique(slug(&text), &mut used);
             let Event::Start(Tag::Heading { level, id, .. }) = &mut events[at] else { continue };
             if *level as usize > 1 {
-                headings.push((anchor.clone(), text));
+                headings.push(Heading { anchor: anchor.clone(), text, meaning: String::new() });
             }
             *id = Some(anchor.into());
         }

@@ -40,14 +40,22 @@ pub(crate) struct Page {
     pub(crate) source: String,
     /// HTML of the content, empty until [`set_body`](Self::set_body).
     pub(crate) body: String,
-    /// Anchors and texts of the headings below the title.
-    pub(crate) headings: Vec<(String, String)>,
+    /// Headings below the title.
+    pub(crate) headings: Vec<Heading>,
+}
+
+/// A place of a page that the search finds.
+pub(crate) struct Heading {
+    pub(crate) anchor: String,
+    pub(crate) text: String,
+    /// Further text, such as the meaning of a field; may be empty.
+    pub(crate) meaning: String,
 }
 
 /// HTML of a page and its headings.
 pub(crate) struct Body {
     pub(crate) html: String,
-    pub(crate) headings: Vec<(String, String)>,
+    pub(crate) headings: Vec<Heading>,
 }
 
 impl Page {

@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use serde_json::Value;
 
 use crate::Input;
-use crate::page::{Group, Page, escape};
+use crate::page::{Group, Heading, Page, escape};
 
 /// Returns a page for each section, and the page that lists them.
 pub(crate) fn pages(input: &Input) -> Result<Vec<Page>> {
@@ -23,7 +23,7 @@ pub(crate) fn pages(input: &Input) -> Result<Vec<Page>> {
         let mut page = Page::new(format!("recipe/{name}.html"), Group::Recipe, format!("[{name}]"), text);
         page.headings = section.fields;
         table += &format!("| [`{name}`]({name}.html) | {} |\n", described(&node));
-        list += &page.headings.iter().map(|(anchor, text)| link(name, anchor, text)).collect::<String>();
+        list += &page.headings.iter().map(|field| link(name, field)).collect::<String>();
         pages.push(page);
     }
     let introduction = input.read("site/pages/recipe.md")?;
@@ -33,8 +33,9 @@ pub(crate) fn pages(input: &Input) -> Result<Vec<Page>> {
     Ok(pages)
 }
 
-fn link(section: &str, anchor: &str, text: &str) -> String {
-    format!("<li><a href=\"{section}.html#{anchor}\"><code>{}</code></a></li>\n", escape(text))
+fn link(section: &str, field: &Heading) -> String {
+    let text = escape(&field.text);
+    format!("<li><a href=\"{section}.html#{}\"><code>{text}</code></a></li>\n", field.anchor)
 }
 
 /// The page of a section.
@@ -42,8 +43,8 @@ struct Section<'a> {
     schema: &'a Value,
     html: String,
     anchors: BTreeSet<String>,
-    /// Anchors and names of the fields.
-    fields: Vec<(String, String)>,
+    /// Names of the fields and of parts of the section.
+    fields: Vec<Heading>,
 }
 
 impl Section<'_> {
@@ -85,7 +86,7 @@ impl Section<'_> {
         let title = format!("{path}.{tag} = \"{value}\"");
         let anchor = self.anchor(&format!("{path}.{tag}-{value}"), "");
         self.html += &format!("<h2 id=\"{anchor}\"><code>{}</code></h2>\n{}", escape(&title), paragraph(variant));
-        self.fields.push((anchor, title));
+        self.fields.push(Heading { anchor, text: title, meaning: described(variant) });
         self.all(fields, path, value);
     }
 
@@ -101,15 +102,16 @@ impl Section<'_> {
             let path = format!("{path}.{name}");
             let anchor = self.anchor(&path, variant);
             self.html += &format!("<h2 id=\"{anchor}\"><code>{}</code></h2>\n{}", escape(&path), paragraph(node));
-            self.fields.push((anchor, path.clone()));
+            self.fields.push(Heading { anchor, text: path.clone(), meaning: described(node) });
             self.walk(node, &path);
         }
     }
 
     fn field(&mut self, node: &Value, path: &str, variant: &str) {
         let anchor = self.anchor(path, variant);
-        self.fields.push((anchor.clone(), path.to_owned()));
         let (meaning, range) = meaning_and_range(node);
+        let heading = Heading { anchor: anchor.clone(), text: path.to_owned(), meaning: meaning.clone() };
+        self.fields.push(heading);
         let mut facts = vec![kind(node).to_owned()];
         facts.extend(range.map(|range| escape(&range)));
         facts.push(match node.get("default") {

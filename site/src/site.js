@@ -31,9 +31,9 @@ async function search() {
   const words = box.value.toLowerCase().split(/\s+/).filter(Boolean);
   await load();
   const hits = [];
-  for (const [title, address, place] of words.length ? window.papsynthPages : []) {
+  for (const [title, address, place, meaning] of words.length ? window.papsynthPages : []) {
     const low = title.toLowerCase();
-    const all = `${low} ${place.toLowerCase()}`;
+    const all = `${low} ${place} ${meaning}`.toLowerCase();
     if (words.every((word) => all.includes(word))) {
       const rank = low === words.join(" ") ? 0 : low.startsWith(words[0]) ? 1 : low.includes(words[0]) ? 2 : 3;
       hits.push({ title, address, place, rank });

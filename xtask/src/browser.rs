@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 
 use crate::shell::{self, skipped};
 use crate::workspace::Workspace;
-use crate::{dataset, python};
+use crate::{dataset, python, site};
 
 /// Names of Chromium on different systems.
 const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
@@ -38,7 +38,10 @@ pub(crate) fn run(workspace: &Workspace) -> Result<()> {
         shell::run(Command::new(&python).arg(script).arg(&program).arg(chromium).args(folders))
     };
     run("browser_study.py", &[&real, &synthetic, &folder.join("study")])?;
-    run("browser_view.py", &[&stack, &folder.join("view")])
+    run("browser_view.py", &[&stack, &folder.join("view")])?;
+    let pages = site::check(workspace)?;
+    let script = workspace.root.join("site/tests/browser_site.py");
+    shell::run(Command::new(&python).arg(script).arg(chromium).args([&pages, &folder.join("site")]))
 }
 
 /// Replaces a folder by the images of another.

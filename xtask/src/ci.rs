@@ -10,12 +10,12 @@ use anyhow::{Result, bail, ensure};
 use crate::bench::counts;
 use crate::shell::{self, Skipped, skipped};
 use crate::workspace::Workspace;
-use crate::{browser, dataset, deps, equations, external, hashes, package, prose, supply, test, vectors};
+use crate::{browser, dataset, deps, equations, external, hashes, package, prose, site, supply, test, vectors};
 
 type Step = (&'static str, fn(&Workspace) -> Result<()>);
 
 /// In order of increasing time. The golden images are part of the tests.
-const STEPS: [Step; 14] = [
+const STEPS: [Step; 15] = [
     ("format", |workspace| shell::run(workspace.cargo().args(["fmt", "--all", "--check"]))),
     ("dependencies", deps::run),
     ("equations", equations::run),
@@ -24,6 +24,7 @@ const STEPS: [Step; 14] = [
     ("lints", |workspace| lints(workspace.cargo_light(&["clippy"]))),
     ("documentation", |workspace| documentation(workspace.cargo_light(&["doc"]))),
     ("tests", |workspace| test::suite(workspace, Workspace::cargo_light, &[])),
+    ("site", |workspace| site::check(workspace).map(drop)),
     ("data set", dataset::run),
     ("vector code", vectors::run),
     ("instructions", |workspace| counts::run(workspace, false)),
@@ -34,13 +35,14 @@ const STEPS: [Step; 14] = [
 
 /// Steps with heavy crates, heavy readers, other processors and packaging; at most 80 minutes including the steps
 /// above.
-const FULL: [Step; 11] = [
+const FULL: [Step; 12] = [
     ("licences", |workspace| supply::deny(workspace, &[])),
     ("heavy lints", |workspace| lints(workspace.cargo_heavy(&["clippy"]))),
     ("heavy docs", |workspace| documentation(workspace.cargo_heavy(&["doc"]))),
     ("heavy tests", |workspace| test::suite(workspace, Workspace::cargo_heavy, &[])),
     ("feature doc tests", feature_doc_tests),
     ("every reader", |workspace| external::run(workspace, true)),
+    ("gallery", site::whole),
     ("packages", supply::publish),
     ("python package", package::run),
     ("training scripts", package::training),

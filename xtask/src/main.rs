@@ -18,6 +18,7 @@ mod prose;
 mod python;
 mod realism;
 mod shell;
+mod site;
 mod supply;
 mod test;
 mod vectors;
@@ -94,6 +95,7 @@ enum DevCommand {
         quick: bool,
     },
     Worth(worth::Worth),
+    Site(site::Site),
     /// Lists the items that cite each equation of the paper, and fails if an equation is not cited
     ///
     /// Reads the documentation of every item in crates/*/src: "Eq. 4", "Eqs. 1, 2", "Eqs. 8 to 10". Comments cite the
@@ -216,6 +218,7 @@ fn run(command: DevCommand) -> Result<()> {
         DevCommand::Figures { wanted } => figures::run(workspace, &wanted),
         DevCommand::Realism { quick } => realism::run(workspace, quick),
         DevCommand::Worth(options) => worth::run(workspace, &options),
+        DevCommand::Site(options) => site::run(workspace, &options),
         DevCommand::Equations => equations::run(workspace),
         DevCommand::Prose => prose::run(workspace),
         DevCommand::Vectors => vectors::run(workspace),

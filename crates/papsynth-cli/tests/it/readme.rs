@@ -1,7 +1,7 @@
-//! Runs every command of the READMEs and of the pages in docs, on smaller fields and fewer frames.
+//! Runs every command of the READMEs and of the pages in docs and site, on smaller fields and fewer frames.
 //!
-//! The commands of a file run in order in one folder: they may only use what previous commands write, and fixtures.
-//! [`SMALLER`] lists all changes of commands, [`FIXTURES`] the files of a user.
+//! The commands of a file run in order in one folder: they may only use what previous commands write, fixtures, and
+//! blocks of TOML with a file name. [`SMALLER`] lists all changes of commands, [`FIXTURES`] the files of a user.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
@@ -223,6 +223,26 @@ fn lines(page: &str) -> Vec<Line> {
     found
 }
 
+/// The blocks of TOML with a file name, such as "```toml stain.toml": name and content.
+fn files(page: &str) -> Vec<(String, String)> {
+    let mut found: Vec<(String, String)> = Vec::new();
+    let mut is_file = false;
+    for line in page.lines() {
+        match (is_file, line.strip_prefix("```")) {
+            (false, Some(language)) => {
+                if let Some(name) = language.strip_prefix("toml ") {
+                    found.push((name.to_owned(), String::new()));
+                    is_file = true;
+                }
+            }
+            (true, Some(_)) => is_file = false,
+            (true, None) => found.last_mut().unwrap().1.extend([line, "\n"]),
+            (false, None) => (),
+        }
+    }
+    found
+}
+
 /// The commands of one page, in one folder.
 struct Page {
     bench: Bench,
@@ -412,6 +432,11 @@ fn pages(folder: &Path) -> Vec<PathBuf> {
 /// Runs the commands of a text in a new folder, and returns their number.
 fn run_text(text: &str) -> usize {
     let mut page = Page { bench: Bench::new("readme"), parts: Vec::new() };
+    for (name, content) in files(text) {
+        let is_used = text.lines().any(|line| line.starts_with("papsynth ") && line.contains(&name));
+        assert!(is_used, "no command uses {name}");
+        fs::write(page.bench.path(&name), content).unwrap();
+    }
     let lines = lines(text);
     lines.iter().for_each(|line| page.run(line));
     lines.len()
@@ -453,6 +478,17 @@ fn every_command_of_other_readmes_and_of_docs_runs() {
     }
     files.push(workspace().join("benches/README.md"));
     assert!(files.iter().map(|path| run_page(path)).sum::<usize>() > 8);
+}
+
+#[test]
+fn every_command_of_the_pages_of_the_site_runs() {
+    assert!(pages(&workspace().join("site/pages")).iter().map(|path| run_page(path)).sum::<usize>() > 30);
+}
+
+#[test]
+fn blocks_with_a_name_are_files() {
+    let page = "```toml\na = 1\n```\n```toml mine.toml\nb = 2\nc = 3\n```\n";
+    assert_eq!(files(page), [("mine.toml".to_owned(), "b = 2\nc = 3\n".to_owned())]);
 }
 
 #[test]
