@@ -1,8 +1,9 @@
 //! Checks the finished site: links, anchors, and that no page loads anything from elsewhere.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 
 use crate::Input;
 use crate::page::{Page, folder, join};
@@ -11,13 +12,21 @@ use crate::page::{Page, folder, join};
 pub(crate) fn check(input: &Input, pages: &[Page]) -> Result<usize> {
     let mut texts = BTreeMap::new();
     for page in pages {
-        let text = std::fs::read_to_string(input.out.join(&page.path))?;
+        let path = input.out.join(&page.path);
+        let text = fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
         texts.insert(page.path.as_str(), text);
     }
+    let (problems, count) = problems(&texts, |path| input.out.join(path).is_file());
+    ensure!(problems.is_empty(), "{} problems in links of the site:\n{}", problems.len(), problems.join("\n"));
+    Ok(count)
+}
+
+/// Returns the problems of pages, given by their paths, and the number of links.
+fn problems(texts: &BTreeMap<&str, String>, exists: impl Fn(&str) -> bool) -> (Vec<String>, usize) {
     let anchors: BTreeMap<&str, BTreeSet<&str>> =
         texts.iter().map(|(path, text)| (*path, values(text, "id").collect())).collect();
     let (mut problems, mut count) = (Vec::new(), 0);
-    for (path, text) in &texts {
+    for (path, text) in texts {
         let doubled = values(text, "id").count() - anchors[path].len();
         if doubled > 0 {
             problems.push(format!("{path}: {doubled} anchors occur twice"));
@@ -29,7 +38,7 @@ pub(crate) fn check(input: &Input, pages: &[Page]) -> Result<usize> {
             count += 1;
             let (target, anchor) = link.split_once('#').unwrap_or((link, ""));
             let target = if target.is_empty() { Some((*path).to_owned()) } else { join(folder(path), target) };
-            let Some(target) = target.filter(|target| input.out.join(target).is_file()) else {
+            let Some(target) = target.filter(|target| exists(target)) else {
                 problems.push(format!("{path}: {link}: there is no such file"));
                 continue;
             };
@@ -39,8 +48,7 @@ pub(crate) fn check(input: &Input, pages: &[Page]) -> Result<usize> {
             }
         }
     }
-    ensure!(problems.is_empty(), "{} problems in links of the site:\n{}", problems.len(), problems.join("\n"));
-    Ok(count)
+    (problems, count)
 }
 
 /// Returns the values of an attribute in a page of our own making, which quotes all of them.
@@ -55,6 +63,25 @@ fn values<'a>(text: &'a str, name: &'a str) -> impl Iterator<Item = &'a str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn broken_links_are_found() {
+        let good = "<p id=\"x\"></p><a href=\"b/c.html#y\"></a><a href=\"https://example.org\"></a>".to_owned();
+        let texts = BTreeMap::from([("a.html", good), ("b/c.html", "<p id=\"y\"></p>".to_owned())]);
+        let exists = |path: &str| ["a.html", "b/c.html"].contains(&path);
+        assert_eq!(problems(&texts, exists), (Vec::new(), 1));
+        for bad in [
+            "<a href=\"d.html\"></a>",
+            "<a href=\"../a.html#z\"></a>",
+            "<a href=\"../../a.html\"></a>",
+            "<img src=\"https://example.org/a.png\">",
+            "<p id=\"y\"></p>",
+        ] {
+            let mut texts = texts.clone();
+            texts.insert("b/c.html", format!("<p id=\"y\"></p>{bad}"));
+            assert_eq!(problems(&texts, exists).0.len(), 1, "{bad}");
+        }
+    }
 
     #[test]
     fn attributes_are_found_in_tags_only() {

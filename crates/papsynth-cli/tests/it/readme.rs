@@ -41,6 +41,7 @@ struct Smaller {
 /// The first entry that matches applies. A command without an entry runs as printed.
 const SMALLER: &[Smaller] = &[
     Smaller { command: "generate --out fields", replaced: &[("--frames", "4")], inserted: &[NUCLEI] },
+    Smaller { command: "generate matched.toml --out", replaced: &[("--frames", "4")], inserted: &[NUCLEI] },
     Smaller { command: "generate", replaced: &[("--frames", "4")], inserted: &[FIELD] },
     Smaller { command: "preview", replaced: &[], inserted: &[FIELD] },
     Smaller { command: "plan", replaced: &[], inserted: &[FIELD, "--samples 2"] },
@@ -64,6 +65,7 @@ const SMALLER: &[Smaller] = &[
 const FEATURES: &[(&str, bool)] = &[
     ("slide make", cfg!(feature = "zarr")),
     ("slide finalize", cfg!(feature = "zarr")),
+    ("verify slide", cfg!(feature = "zarr")),
     ("view slide", cfg!(feature = "zarr")),
     ("ome-zarr", cfg!(feature = "zarr")),
     ("huggingface", cfg!(feature = "parquet")),
