@@ -21,8 +21,9 @@ pub(crate) fn page(input: &Input) -> Result<Page> {
         let (name, meaning) = line.split_once(' ').with_context(|| format!("`papsynth init --list`: {line}"))?;
         let preset = input.read(&format!("crates/papsynth/presets/{name}.toml"))?;
         let words = ["generate", "--preset", name, "--frames", "1", "--seed", "7", "--out", name];
-        list += &format!("- [{name}](#{name}): {}\n", meaning.trim());
-        text += &format!("\n## {name}\n\n{}.\n\n", meaning.trim());
+        let meaning = capitalised(meaning.trim());
+        list += &format!("- [{name}](#{name}): {meaning}\n");
+        text += &format!("\n## {name}\n\n{meaning}.\n\n");
         if input.pictures == Pictures::Rendered {
             text += &picture(input, &work, name, &words)?;
         }
@@ -38,6 +39,12 @@ pub(crate) fn page(input: &Input) -> Result<Page> {
         Page::new("gallery.html", Group::Start, "Gallery of presets", format!("{before}{list}{text}{after}"));
     page.source = "site/pages/gallery.md".to_owned();
     Ok(page)
+}
+
+/// Returns a text whose first letter is a capital.
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// Renders a field and returns its element.

@@ -7,7 +7,8 @@ const found = document.getElementById("found");
 const wide = window.matchMedia("(min-width: 60rem)");
 const menu = document.querySelector(".menu");
 
-// The contents are always open beside a wide page.
+// With scripts, the contents are always open beside a wide page.
+document.documentElement.classList.add("scripts");
 const follow = () => { menu.open = wide.matches; };
 wide.addEventListener("change", follow);
 follow();

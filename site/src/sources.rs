@@ -117,9 +117,9 @@ fn names(input: &Input, folder: &str) -> Result<Vec<String>> {
     Ok(names)
 }
 
-/// Puts pages into the order of the parts of the navigation.
+/// Puts pages into the order of the parts of the navigation; the overview is the last page of the first part.
 pub(crate) fn sort(pages: &mut [Page]) {
-    pages.sort_by_key(|page| page.group);
+    pages.sort_by_key(|page| (page.group, page.path == "overview.html"));
 }
 
 /// Returns the path of the page of each Markdown file, and of the folder of formats.
