@@ -38,7 +38,8 @@ pub(crate) fn run(workspace: &Workspace) -> Result<()> {
         shell::run(Command::new(&python).arg(script).arg(&program).arg(chromium).args(folders))
     };
     run("browser_study.py", &[&real, &synthetic, &folder.join("study")])?;
-    run("browser_view.py", &[&stack, &folder.join("view")])
+    run("browser_view.py", &[&stack, &folder.join("view")])?;
+    run("browser_workbench.py", &[&folder.join("workbench")])
 }
 
 /// Replaces a folder by the images of another.

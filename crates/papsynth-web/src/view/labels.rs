@@ -47,6 +47,11 @@ impl Ids {
 
     /// Returns red, green, blue and opacity of every pixel.
     pub(crate) fn rgba(&self) -> Vec<u8> {
+        self.rgba_with(FILL)
+    }
+
+    /// As [`rgba`](Self::rgba), with another opacity of the fill.
+    pub(crate) fn rgba_with(&self, fill: u8) -> Vec<u8> {
         let row = self.width + 2;
         let mut bytes = Vec::with_capacity(4 * self.width * self.height);
         for y in 1..=self.height {
@@ -58,7 +63,7 @@ impl Ids {
                 let is_other = |at: usize| self.ids[at].is_some_and(|other| other != id);
                 let is_edge = [at - 1, at + 1, at - row, at + row].into_iter().any(is_other);
                 let [red, green, blue] = colour(id);
-                bytes.extend([red, green, blue, if is_edge { u8::MAX } else { FILL }]);
+                bytes.extend([red, green, blue, if is_edge { u8::MAX } else { fill }]);
             }
         }
         bytes

@@ -116,7 +116,7 @@ impl Workbench {
                 let text = if commented { recipe.to_commented_toml() } else { recipe.to_toml() };
                 Ok(Reply::json(&json!({ "text": text })))
             }
-            ("POST", ["real"]) => real::decoded(request.body),
+            ("POST", ["real"]) => real::decoded(request),
             (_, ["info" | "at" | "labels" | "image.png" | "mask", ..]) => Err(Reply::wrong_method("GET")),
             (_, ["check" | "print" | "real" | "render", ..]) => Err(Reply::wrong_method("POST")),
             _ => Err(Reply::error(404, "not found")),

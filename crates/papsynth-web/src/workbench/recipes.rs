@@ -5,7 +5,7 @@ use papsynth::recipe::diagnose::{self, FieldError};
 use papsynth::recipe::{InvalidField, Recipe};
 use serde_json::{Value, json};
 
-/// Reads a recipe. Returns `{"recipe": …}`, or `{"errors": …}` with the line of each error.
+/// Reads a recipe. Returns `{"recipe": …, "sections": …}` with the names of the sections in the text, or `{"errors": …}` with the line of each error.
 pub(super) fn checked(text: &str, model: &Model) -> Value {
     match diagnose::read(text) {
         Err(errors) => json!({ "errors": errors.iter().map(|error| located(text, error)).collect::<Vec<_>>() }),
@@ -13,7 +13,8 @@ pub(super) fn checked(text: &str, model: &Model) -> Value {
             let mut errors: Vec<FieldError> = recipe.problems().iter().map(of_field).collect();
             errors.extend(diagnose::unknown_classes(&recipe, model));
             if errors.is_empty() {
-                return json!({ "recipe": recipe });
+                let sections: toml::Table = toml::from_str(text).unwrap_or_default();
+                return json!({ "recipe": recipe, "sections": sections.keys().collect::<Vec<_>>() });
             }
             json!({ "errors": errors.iter().map(|error| located(text, error)).collect::<Vec<_>>() })
         }
@@ -58,5 +59,6 @@ mod tests {
         assert_eq!(line(""), Some(1));
         let read = checked("[camera]\nread_noise_e = 7\n", &Model::builtin());
         assert_eq!(read["recipe"]["camera"]["read_noise_e"].as_f64(), Some(7.0));
+        assert_eq!(read["sections"], json!(["camera"]));
     }
 }

@@ -232,7 +232,7 @@ impl Renderer {
             let region = Region { rows: 0..height, columns: 0..width };
             (Ids::new(&region, &region, &truth.labels(group).ids), region)
         })?;
-        png(&ids.rgba(), region.width(), 4)
+        png(&ids.rgba_with(OUTLINE_FILL), region.width(), 4)
     }
 
     /// Returns the ids of a group as PNG with 16 bits, as in data sets.
@@ -274,6 +274,9 @@ fn image(
     let image = live.image(&asked.recipe, scene.clone(), Threads::All, cancellation)?;
     Ok((scene, all_um, image))
 }
+
+/// Opacity of the fill of outlines: the image stays visible.
+const OUTLINE_FILL: u8 = 30;
 
 /// Largest distance of the stage from its zero, µm.
 const MAX_FOCUS_UM: f64 = 200.0;

@@ -53,7 +53,7 @@ function fieldsOf(schema, value, path) {
 
 const formOf = (value) => (isTable(value) ? DISTRIBUTIONS.find((name) => name in value) : "constant");
 const FORMS = { constant: "constant", uniform: "uniform", normal: "normal", log_normal: "log-normal", choice: "choice" };
-const PARTS = { uniform: ["from", "to"], normal: ["mean", "standard deviation"], log_normal: ["median", "standard deviation of the logarithm"] };
+const PARTS = { uniform: ["from", "to"], normal: ["mean", "sd"], log_normal: ["median", "sd of log"] };
 
 /** Returns the centre of a number: the value that its slider moves. */
 function centre(value) {
@@ -151,8 +151,9 @@ function sliderRange(schema, base, value) {
 }
 
 /** Editor of a number, a distribution, or a density. */
-function numberEditor(path, schema, label, rebuild) {
+function numberEditor(path, schema, label) {
   const node = made("div", [], "number");
+  const forms = made("span", [], "forms");
   const name = dotted(path);
   const isDensity = schema.name === "Abundance";
   const mayVary = schema.name === "Number" || isDensity || schema.anyOf !== undefined;
@@ -189,6 +190,7 @@ function numberEditor(path, schema, label, rebuild) {
   };
   function build(value, form) {
     node.replaceChildren();
+    forms.replaceChildren();
     node.fields = [];
     node.plot = null;
     const row = made("div", [], "row");
@@ -219,12 +221,13 @@ function numberEditor(path, schema, label, rebuild) {
       select.value = form;
       select.setAttribute("aria-label", `${label}, distribution`);
       select.addEventListener("change", () => put(formed(present(), select.value, limits), false));
-      row.append(select);
+      forms.append(select);
     }
     node.append(row);
     if (form !== "constant") {
       const parts = made("div", [], "parts");
       const part = (text, read, write) => parts.append(made("label", [`${text} `, add("number", `${label}, ${text}`, read, write, { step: "any" })]));
+      parts.classList.toggle("wide", form === "choice");
       if (form === "choice") {
         const text = input("text", `${label}, values`, value.choice.join(", "), (own) => {
           const values = own.value.split(/[\s,;]+/).filter(Boolean).map(Number);
@@ -257,11 +260,11 @@ function numberEditor(path, schema, label, rebuild) {
         const middle = centre(present());
         edit(path, select.value === "mm2" ? { per_mm2: tidy(middle * factor) } : Math.round(middle * factor));
       });
-      row.append(select);
+      forms.prepend(select);
     }
   }
   update();
-  return { node, update };
+  return { node, update, forms };
 }
 
 function wordEditor(path, schema, label) {
@@ -303,7 +306,7 @@ function fieldNode({ path, schema }, isLong) {
   help.id = `help-${(count += 1)}`;
   const fault = made("p", "", "fault");
   fault.id = `fault-${count}`;
-  node.append(made("div", [text, reset], "head"), editor.node, help, fault);
+  node.append(made("div", [text, editor.forms ?? "", reset], "head"), editor.node, help, fault);
   const update = () => {
     editor.update();
     const base = at(state.base, path);

@@ -66,6 +66,20 @@ function say(text) {
 
 const status = (text) => { element("status").textContent = text; };
 
+/** Time of an image relative to that of its reduced image, at least; time beyond which a smaller field is offered, ms. */
+const [FULL_FACTOR, SLOW_MS] = [3.5, 4000];
+
+/** Says how long the image takes, and offers a smaller field. */
+function offerSmaller(ms) {
+  const button = Object.assign(made("button", "Halve width and height"), { type: "button" });
+  button.addEventListener("click", () => {
+    const half = (side) => moved(side, Math.max(Math.round(centre(side) / 2), 16), [16, 32768]);
+    const { width_px, height_px } = state.recipe.field;
+    edit(["field"], { ...state.recipe.field, width_px: half(width_px), height_px: half(height_px) });
+  });
+  element("status").replaceChildren(`This field takes about ${Math.round(ms / 1000)} s.`, button);
+}
+
 /** Requests an image of the present state. `name` is that of the changed field. */
 function render(name = null) {
   if (name === null || name !== lastName) lastMs = Infinity;
@@ -105,6 +119,7 @@ async function renderKind(kind) {
   showFaults([]);
   if (kind === "full") lastMs = head.ms;
   show(reply);
+  if (kind === "reduced" && FULL_FACTOR * head.ms > SLOW_MS) offerSmaller(FULL_FACTOR * head.ms);
   return true;
 }
 
@@ -297,12 +312,12 @@ function makeStrip() {
 function showFacts() {
   const { head } = shown;
   const um = [head.width, head.height].map((px) => px * head.pixel_um);
-  element("size").textContent = `${image.width} × ${image.height} px · ${um.map((side) => side.toFixed(0)).join(" × ")} µm`;
+  element("size").textContent = `${um.map((side) => side.toFixed(0)).join(" × ")} µm`;
   if (head.factor > 1) return;
   const { phantoms, planes, background } = head.made;
   const again = phantoms ? `${phantoms} objects` : planes ? "light" : background ? "background" : "camera";
   const rows = [
-    ["objects", head.objects], ["cells in the field", head.cells],
+    ["pixels", `${head.width} × ${head.height}`], ["objects", head.objects], ["cells in the field", head.cells],
     ...(head.unplaced ? [["cells without room", head.unplaced]] : []),
     ["pixel", `${Number(head.pixel_um.toPrecision(4))} µm`], ["bits", head.bits],
     ["saturated", `${((100 * head.saturated_px) / (head.width * head.height)).toFixed(2)} %`],

@@ -75,6 +75,31 @@ element("text").addEventListener("blur", () => {
 });
 element("text").addEventListener("scroll", ({ target }) => { element("lines").scrollTop = target.scrollTop; });
 
+/** Reads a file: a recipe, or sections that replace those of the recipe. */
+async function openFile(input, isPart) {
+  const [file] = input.files;
+  input.value = "";
+  if (!file) return;
+  try {
+    const text = await file.text();
+    const { recipe, sections, errors } = await (await request("check", { text })).json();
+    if (errors) {
+      const [{ line, message }] = errors;
+      say(`${file.name}${line ? `, line ${line}` : ""}: ${message}`);
+      return;
+    }
+    settle();
+    isEdited = false;
+    const parts = Object.fromEntries(sections.map((name) => [name, recipe[name]]));
+    setRecipe(isPart ? { ...state.recipe, ...parts } : recipe);
+    status(`${file.name} is read.`);
+  } catch (error) {
+    say(error.message);
+  }
+}
+element("open-recipe").addEventListener("change", ({ target }) => openFile(target, false));
+element("lay-over").addEventListener("change", ({ target }) => openFile(target, true));
+
 function showTab(name) {
   for (const tab of ["form", "text"]) {
     const isOn = tab === name;
