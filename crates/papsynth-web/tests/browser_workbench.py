@@ -1,8 +1,9 @@
 """Changes a recipe in the workbench with keyboard and mouse, and compares its pixels with those of the command line.
 
-Usage: browser_workbench.py PAPSYNTH CHROMIUM FOLDER
+Usage: browser_workbench.py PAPSYNTH CHROMIUM FOLDER [--times]
 
-FOLDER is emptied; screenshots and images go there.
+FOLDER is emptied; screenshots and images go there. With --times, prints the times from a change of the default recipe to its
+image in the browser instead.
 """
 
 import hashlib
@@ -148,7 +149,83 @@ def check_focus(browser, second):
     browser.ready()
 
 
+def check_preset(browser):
+    """Changes the preset, and compares an image of the user, which is the image itself."""
+    before = browser.run("state.preset + element('changed').textContent")
+    browser.change("#preset", "high-grade")
+    browser.until("state.preset === 'high-grade' && state.recipe === state.base")
+    browser.click("#undo")
+    assert browser.run("state.preset + element('changed').textContent") == before
+    browser.click("#redo")
+    browser.change("[data-path='field.width_px'] input[type=number]", "300")
+    browser.change("[data-path='field.height_px'] input[type=number]", "260")
+    browser.until("shown.head.width === 300 && shown.head.height === 260")
+    browser.ready()
+    browser.run("""(async () => {
+        const blob = await (await fetch(`image.png/${shown.head.id}`)).blob();
+        await useReal(new File([blob], "own.png"));
+    })()""")
+    browser.until("document.querySelectorAll('#distances meter').length > 5", lambda: browser.run("document.body.innerText"))
+    assert browser.run("[...document.querySelectorAll('#distances meter')].every((meter) => meter.value === 0)")
+    browser.click("#real-remove")
+    browser.until("element('real-shown').hidden")
+
+
+TIMES = """(async () => {
+    const wait = () => new Promise((resolve) => setTimeout(resolve));
+    const own = show;
+    let [first, start] = [null, 0];
+    show = (reply) => { own(reply); first ??= performance.now() - start; };
+    const until = async () => { while (running || dirty || shown.head.factor > 1) await wait(); };
+    const base = state.recipe;
+    const CHANGES = {
+        camera: (k) => edit(["camera", "read_noise_e"], 100 + k),
+        focus: (k) => setFocus(0.7 * (k + 1)),
+        optics: (k) => edit(["optics", "condenser_na"], 0.3 + 0.01 * k),
+        debris: (k) => edit(["debris", "speckles", "count"], 20 + 5 * k),
+        cells: (k) => edit(["cells", "intermediate", "count"], { per_mm2: 110 + 10 * k }),
+        stain: (k) => edit(["stain", "slide_cytoplasm"], 0.6 + 0.05 * k),
+    };
+    const median = (values) => Math.round(values.sort((a, b) => a - b)[values.length >> 1]);
+    const rows = [];
+    for (const [name, change] of Object.entries(CHANGES)) {
+        const [firsts, wholes] = [[], []];
+        for (let k = 0; k < 7; k += 1) {
+            setFocus(null);
+            setRecipe(base);
+            await until();
+            [first, start] = [null, performance.now()];
+            change(k);
+            await until();
+            firsts.push(first);
+            wholes.push(performance.now() - start);
+        }
+        rows.push([name, median(firsts), median(wholes), Math.round(Math.min(...firsts)), Math.round(Math.min(...wholes))]);
+    }
+    return rows;
+})()"""
+
+
+def print_times(program, chromium):
+    """Prints the median time until the first image and until the image of full resolution of each change, ms."""
+    served = Served(program, ["workbench"])
+    browser = Workbench(chromium)
+    try:
+        browser.open(served.address)
+        browser.ready()
+        print(browser.run("`${shown.head.width} x ${shown.head.height} pixels, ${shown.head.objects} objects`"))
+        print("change    first  whole  (least: first  whole), ms")
+        for name, *times in browser.run(TIMES):
+            print("{:8} {:6} {:6} {:14} {:6}".format(name, *times))
+    finally:
+        browser.close()
+    served.interrupt()
+
+
 def main():
+    if sys.argv[4:] == ["--times"]:
+        print_times(*sys.argv[1:3])
+        return
     program, chromium, folder = sys.argv[1:]
     folder = Path(folder)
     shutil.rmtree(folder, ignore_errors=True)
@@ -182,10 +259,7 @@ def main():
         assert browser.hash() == fourth
         assert browser.run("layers.get('nucleus').on && focus === 1.5 && state.index === 2")
         browser.picture(folder / "link.png")
-        # A preset with many other sections.
-        browser.change("#preset", "high-grade")
-        browser.until("state.preset === 'high-grade'")
-        browser.ready()
+        check_preset(browser)
         urls = browser.requests()
         assert urls and all(url.startswith((served.address, "data:", "about:", "blob:")) for url in urls), urls
         complaints = browser.complaints()

@@ -1,10 +1,12 @@
 //! The workbench: a recipe and its image, for experiments with every number. It writes nothing.
 
+#[cfg(feature = "judge")]
+mod compare;
 mod real;
 mod recipes;
 mod rendering;
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use papsynth::model::Model;
 use papsynth::recipe::{CameraPreset, Preset, Recipe};
@@ -17,6 +19,7 @@ use crate::error::Error;
 use crate::page::{self, CSS, File, HTML, JS};
 use crate::server::{Reply, Request, Site, SlowReply};
 use crate::view::{excerpt, number};
+use real::RealImage;
 use rendering::{RenderRequest, Renderer};
 
 const PAGE: [File; 8] = [
@@ -57,6 +60,8 @@ pub struct WorkbenchParams {
 pub struct Workbench {
     params: WorkbenchParams,
     renderer: Arc<Renderer>,
+    /// The image of the user.
+    real: Arc<Mutex<Option<RealImage>>>,
 }
 
 /// The text of a recipe.
@@ -82,7 +87,7 @@ impl Workbench {
     /// If the model is invalid.
     pub fn new(params: WorkbenchParams) -> Result<Self, Error> {
         let renderer = Arc::new(Renderer::new(&params)?);
-        Ok(Self { params, renderer })
+        Ok(Self { params, renderer, real: Arc::default() })
     }
 
     /// Returns all that the page needs before the first image.
@@ -96,6 +101,7 @@ impl Workbench {
             "presets": Preset::ALL.map(preset),
             "cameras": CameraPreset::ALL.map(camera),
             "classes": self.params.model.classes.keys().collect::<Vec<_>>(),
+            "compares": cfg!(feature = "judge"),
             "groups": Group::ALL.map(Group::name),
             "preset": self.params.preset.name(),
             "recipe": self.params.recipe,
@@ -116,9 +122,14 @@ impl Workbench {
                 let text = if commented { recipe.to_commented_toml() } else { recipe.to_toml() };
                 Ok(Reply::json(&json!({ "text": text })))
             }
-            ("POST", ["real"]) => real::decoded(request),
+            ("POST", ["real"]) => {
+                let image = RealImage::decode(request)?;
+                let reply = image.reply();
+                *self.real.lock().unwrap_or_else(PoisonError::into_inner) = Some(image);
+                Ok(reply)
+            }
             (_, ["info" | "at" | "labels" | "image.png" | "mask", ..]) => Err(Reply::wrong_method("GET")),
-            (_, ["check" | "print" | "real" | "render", ..]) => Err(Reply::wrong_method("POST")),
+            (_, ["check" | "compare" | "print" | "real" | "render", ..]) => Err(Reply::wrong_method("POST")),
             _ => Err(Reply::error(404, "not found")),
         }
     }
@@ -133,6 +144,12 @@ impl Workbench {
                 // Cancels earlier images before this one waits for them.
                 let cancellation = renderer.begin(&asked);
                 Some(Box::new(move || renderer.render(&asked, &cancellation)))
+            }
+            #[cfg(feature = "judge")]
+            ("POST", ["compare"]) => {
+                let asked: compare::CompareRequest = request.json()?;
+                let real = Arc::clone(&self.real);
+                Some(Box::new(move || compare::compared(&asked, &renderer, &real).unwrap_or_else(|error| error)))
             }
             ("GET", ["at", id, x, y]) => {
                 let (id, x, y) = (number(id)?, number(x)?, number(y)?);

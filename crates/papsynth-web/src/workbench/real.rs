@@ -1,5 +1,6 @@
-//! An image of the user, decoded in memory.
+//! An image of the user, in memory.
 
+use papsynth::white_level;
 use papsynth_dataset::read::{LevelImage, Limits};
 use serde_json::json;
 
@@ -9,14 +10,36 @@ use crate::server::{Reply, Request};
 /// Content type of image files: browsers do not let pages of other sites send it without asking.
 const BINARY: &[u8] = b"application/octet-stream";
 
-/// Returns the size and the samples of a PNG, JPEG or TIFF file.
-pub(super) fn decoded(request: &Request) -> Result<Reply, Reply> {
-    if request.content_type != Some(BINARY) {
-        return Err(Reply::error(415, "expected content type application/octet-stream"));
+/// Bit depths of cameras whose images have 16 bits: the smallest that holds the brightest pixel is assumed.
+const DEEP: [u32; 3] = [12, 14, 16];
+
+/// An image of the user.
+pub(super) struct RealImage {
+    pub(super) image: LevelImage,
+    /// Bit depth of its grey levels.
+    pub(super) bits: u32,
+}
+
+impl RealImage {
+    /// Decodes a PNG, JPEG or TIFF file.
+    pub(super) fn decode(request: &Request) -> Result<Self, Reply> {
+        if request.content_type != Some(BINARY) {
+            return Err(Reply::error(415, "expected content type application/octet-stream"));
+        }
+        let image = LevelImage::decode(request.body, &Limits::default());
+        let image = image.map_err(|error| Reply::error(422, &error.to_string()))?;
+        let brightest = image.levels.iter().copied().max().unwrap_or(0);
+        let bits = match image.white > u16::from(u8::MAX) {
+            true => DEEP.into_iter().find(|bits| white_level(*bits) >= brightest).unwrap_or(u16::BITS),
+            false => u8::BITS,
+        };
+        Ok(Self { image, bits })
     }
-    let image = LevelImage::decode(request.body, &Limits::default());
-    let image = image.map_err(|error| Reply::error(422, &error.to_string()))?;
-    let bits = if image.white > u16::from(u8::MAX) { u16::BITS } else { u8::BITS };
-    let head = json!({ "width": image.width, "height": image.height(), "channels": image.channels, "bits": bits });
-    Ok(framed(&head, &image.levels, bits))
+
+    /// Returns its size and its samples.
+    pub(super) fn reply(&self) -> Reply {
+        let Self { image, bits } = self;
+        let head = json!({ "width": image.width, "height": image.height(), "channels": image.channels, "bits": bits });
+        framed(&head, &image.levels, *bits)
+    }
 }

@@ -196,7 +196,6 @@ impl Renderer {
 
     /// Returns the last complete image with its ground truth, if it has this number.
     fn with_truth<T>(&self, id: usize, work: impl FnOnce(&Shown, &Truth) -> T) -> Result<T, Reply> {
-        let gone = || Reply::error(404, "another image has replaced this one");
         let is_known = |shown: &Option<Shown>| shown.as_ref().is_some_and(|s| s.id == id && s.truth.is_some());
         if !is_known(&locked(&self.shown)) {
             let mut sessions = locked(&self.sessions);
@@ -215,6 +214,25 @@ impl Renderer {
             Some(shown @ Shown { truth: Some(truth), .. }) if shown.id == id => Ok(work(shown, truth)),
             _ => Err(gone()),
         }
+    }
+
+    /// Passes the grey levels of the last complete image to `work`, if it has this number.
+    #[cfg(feature = "judge")]
+    pub(super) fn with_grey<T>(
+        &self,
+        id: usize,
+        work: impl FnOnce(&super::compare::Grey<'_>) -> T,
+    ) -> Result<T, Reply> {
+        let shown = locked(&self.shown);
+        let shown = shown.as_ref().filter(|shown| shown.id == id);
+        let Shown { plane, scene, .. } = shown.ok_or_else(gone)?;
+        Ok(work(&super::compare::Grey {
+            levels: &plane.grey,
+            channels: plane.channels,
+            width: scene.view.width,
+            bits: scene.camera.bits,
+            pixel_um: scene.view.pixel_um,
+        }))
     }
 
     /// Returns the objects at a pixel, the nearest to the objective first.
@@ -247,13 +265,16 @@ impl Renderer {
     pub(super) fn image(&self, id: usize) -> Result<Reply, Reply> {
         let shown = locked(&self.shown);
         let shown = shown.as_ref().filter(|shown| shown.id == id);
-        let Shown { plane, scene, .. } =
-            shown.ok_or_else(|| Reply::error(404, "another image has replaced this one"))?;
+        let Shown { plane, scene, .. } = shown.ok_or_else(gone)?;
         match scene.camera.bits {
             ..=8 => png(&narrow(&plane.grey), scene.view.width, plane.channels),
             _ => png16(&plane.grey, scene.view.width, plane.channels),
         }
     }
+}
+
+fn gone() -> Reply {
+    Reply::error(404, "another image has replaced this one")
 }
 
 /// Returns one plane of the image of a request, its scene, and the positions of all planes of the recipe.

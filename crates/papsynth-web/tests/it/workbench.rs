@@ -169,6 +169,18 @@ fn images_of_the_user_are_decoded_in_memory() {
     let (real, pixels) = unframed(&reply);
     assert_eq!((&real["width"], &real["channels"], &real["bits"]), (&json!(300), &json!(1), &json!(8)));
     assert_eq!(pixels, samples);
+    #[cfg(feature = "judge")]
+    {
+        // An image does not differ from itself.
+        let found = json_of(&post(&mut workbench, "/compare", &json!({ "id": head["id"], "pixel_um": 0.25 })));
+        let scalars = found["scalars"].as_array().unwrap();
+        assert!(scalars.len() > 5 && scalars.iter().all(|scalar| scalar["difference"] == 0.0), "{found}");
+        assert_eq!(found["spectrum"]["ours"], found["spectrum"]["theirs"]);
+        let gone = post(&mut workbench, "/compare", &json!({ "id": 99, "pixel_um": 0.25 }));
+        assert_eq!(gone.status, 404);
+        let wrong = post(&mut workbench, "/compare", &json!({ "id": head["id"], "pixel_um": 99.0 }));
+        assert_eq!(wrong.status, 422);
+    }
     // A page of another site can send text without asking.
     let content_type = Some(&b"text/plain"[..]);
     let reply = ask(&mut workbench, &Request { method: "POST", target: "/real", content_type, body: &file });

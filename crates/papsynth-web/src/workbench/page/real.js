@@ -1,6 +1,6 @@
 "use strict";
 
-// An image of the user beside the field: at the same scale and grey levels, with histograms and power spectra.
+// An image of the user beside the field: at the same scale and grey levels, with the measurements of the judge.
 
 /** The image: description, samples, canvas. */
 let real = null;
@@ -74,60 +74,6 @@ function histogramOf(values) {
   return counts.map((count) => count / values.length);
 }
 
-/** Fast Fourier transform of rows of complex numbers, in place; the length is a power of 2. */
-function transform(re, im, size, start, stride) {
-  for (let i = 1, j = 0; i < size; i += 1) {
-    let bit = size >> 1;
-    for (; j & bit; bit >>= 1) j ^= bit;
-    j ^= bit;
-    if (i >= j) continue;
-    const [a, b] = [start + i * stride, start + j * stride];
-    [re[a], re[b]] = [re[b], re[a]];
-    [im[a], im[b]] = [im[b], im[a]];
-  }
-  for (let length = 2; length <= size; length *= 2) {
-    const angle = (-2 * Math.PI) / length;
-    for (let k = 0; k < length / 2; k += 1) {
-      const [cos, sin] = [Math.cos(angle * k), Math.sin(angle * k)];
-      for (let first = k; first < size; first += length) {
-        const [a, b] = [start + first * stride, start + (first + length / 2) * stride];
-        const [x, y] = [re[b] * cos - im[b] * sin, re[b] * sin + im[b] * cos];
-        [re[b], im[b]] = [re[a] - x, im[a] - y];
-        [re[a], im[a]] = [re[a] + x, im[a] + y];
-      }
-    }
-  }
-}
-
-/** Returns the mean power of the centre of an image at each frequency, as [cycles per µm, power]. */
-function spectrumOf(values, width, height, um) {
-  const size = Math.min(512, 2 ** Math.floor(Math.log2(Math.min(width, height))));
-  if (size < 32) return [];
-  const [left, top] = [(width - size) >> 1, (height - size) >> 1];
-  const [re, im] = [new Float32Array(size * size), new Float32Array(size * size)];
-  let mean = 0;
-  for (let y = 0; y < size; y += 1) for (let x = 0; x < size; x += 1) mean += values[(top + y) * width + left + x];
-  mean /= size * size;
-  const taper = Float32Array.from({ length: size }, (_, i) => 0.5 - 0.5 * Math.cos((2 * Math.PI * (i + 0.5)) / size));
-  for (let y = 0; y < size; y += 1) {
-    for (let x = 0; x < size; x += 1) re[y * size + x] = (values[(top + y) * width + left + x] - mean) * taper[x] * taper[y];
-  }
-  for (let y = 0; y < size; y += 1) transform(re, im, size, y * size, 1);
-  for (let x = 0; x < size; x += 1) transform(re, im, size, x, size);
-  const [sums, counts] = [new Float64Array(size / 2), new Float64Array(size / 2)];
-  const fold = (i) => (i > size / 2 ? size - i : i);
-  for (let y = 0; y < size; y += 1) {
-    for (let x = 0; x < size; x += 1) {
-      const ring = Math.round(Math.hypot(fold(x), fold(y)));
-      if (ring < 1 || ring >= size / 2) continue;
-      sums[ring] += re[y * size + x] ** 2 + im[y * size + x] ** 2;
-      counts[ring] += 1;
-    }
-  }
-  // Power per frequency and area does not depend on pixel size and crop.
-  return Array.from(sums, (sum, ring) => [ring / (size * um), (sum / counts[ring]) * (um / size) ** 2]).slice(1);
-}
-
 /** Draws curves over each other: lists of points with both coordinates from 0 to 1, and class names. */
 function plot(id, curves, labels) {
   const [width, height, foot] = [260, 90, 14];
@@ -144,42 +90,61 @@ function plot(id, curves, labels) {
   }
 }
 
-const statistics = (values) => {
-  let [sum, squares] = [0, 0];
-  for (const value of values) { sum += value; squares += value * value; }
-  const mean = sum / values.length;
-  return { mean, sd: Math.sqrt(Math.max(squares / values.length - mean * mean, 0)) };
-};
+let comparing = 0;
+
+/** Pause before the images are compared, ms; bars of differences that are shown. */
+const [COMPARE_MS, BARS] = [400, 14];
 
 /** Compares the two images. */
 function showReal() {
   if (!real || !shown || shown.head.factor > 1) return;
-  const [ours, theirs] = [fractions(shown), fractions(real)];
-  const [a, b] = [histogramOf(ours), histogramOf(theirs)];
+  const [a, b] = [fractions(shown), fractions(real)].map(histogramOf);
   const most = Math.max(...a, ...b);
   const bars = (counts) => Array.from(counts, (count, i) => [(i + 0.5) / BINS, Math.sqrt(count / most)]);
-  plot("histogram", [[bars(b), "theirs"], [bars(a), "ours"]], [[0, "0"], [0.5, "50 %"], [0.97, "100 %"]]);
-  const spectra = [
-    [spectrumOf(theirs, real.head.width, real.head.height, realUm()), "theirs"],
-    [spectrumOf(ours, shown.head.width, shown.head.height, shown.head.pixel_um), "ours"],
-  ];
-  const points = spectra.flatMap(([curve_]) => curve_).filter(([, power]) => power > 0);
-  const logs = (k) => points.map((point) => Math.log10(point[k]));
-  const [x0, x1, y0, y1] = [Math.min(...logs(0)), Math.max(...logs(0)), Math.min(...logs(1)), Math.max(...logs(1))];
-  const onPlot = (points_) => points_.filter(([, power]) => power > 0).map(([f, power]) => [(Math.log10(f) - x0) / (x1 - x0), 0.04 + 0.94 * ((Math.log10(power) - y0) / (y1 - y0))]);
-  const periods = [100, 30, 10, 3, 1, 0.5].filter((um) => -Math.log10(um) > x0 && -Math.log10(um) < x1);
-  plot("spectrum", spectra.map(([points_, name]) => [onPlot(points_), name]), periods.map((um) => [(-Math.log10(um) - x0) / (x1 - x0), `${um} µm`]));
-  const [own, other] = [statistics(ours), statistics(theirs)];
-  let difference = 0;
-  let sum = 0;
-  a.forEach((count, i) => { sum += count - b[i]; difference += Math.abs(sum) / BINS; });
-  const percent = (value) => `${(100 * value).toFixed(1)} %`;
-  const rows = [
-    ["mean grey level", `${percent(own.mean)} · ${percent(other.mean)}`],
-    ["standard deviation", `${percent(own.sd)} · ${percent(other.sd)}`],
-    ["distance of histograms", percent(difference)],
-  ];
-  element("real-facts").replaceChildren(...rows.flatMap(([name, value]) => [made("dt", name), made("dd", value)]));
+  plot("histogram", [[bars(b), "theirs"], [bars(a), "ours"]], [[0.01, "0"], [0.5, "50 %"], [0.96, "100 %"]]);
+  element("measured").hidden = !info.compares;
+  clearTimeout(comparing);
+  if (info.compares) comparing = setTimeout(compare, COMPARE_MS);
+}
+
+async function compare() {
+  const { id } = shown.head;
+  try {
+    const found = await (await request("compare", { id, pixel_um: realUm() })).json();
+    if (shown?.head.id === id && real) showCompared(found);
+  } catch (error) {
+    // Another image has replaced this one.
+    if (error.status !== 404) element("distances").replaceChildren(made("p", error.message, "quiet"));
+  }
+}
+
+/** Draws two curves of the judge on common axes. */
+function plotBoth(id, at_, { ours, theirs }, labels) {
+  const values = [...ours, ...theirs].filter(Number.isFinite);
+  const [low, high] = [Math.min(...values), Math.max(...values)];
+  const [left, right] = [Math.min(...at_), Math.max(...at_)];
+  const x = (value) => (value - left) / (right - left || 1);
+  const points = (curve_) => curve_.map((value, i) => [x(at_[i]), 0.04 + 0.92 * ((value - low) / (high - low || 1))]).filter(([, y]) => Number.isFinite(y));
+  plot(id, [[points(theirs), "theirs"], [points(ours), "ours"]], labels.map(([value, text]) => [x(value), text]));
+}
+
+function showCompared({ scalars, spectrum, profile }) {
+  const logs = spectrum.at.map((um) => -Math.log10(um));
+  const nulls = (values) => values.map((value) => value ?? NaN);
+  const both = (curves) => ({ ours: nulls(curves.ours), theirs: nulls(curves.theirs) });
+  const periods = [30, 10, 3, 1].filter((um) => -Math.log10(um) > logs[0] && -Math.log10(um) < logs.at(-1));
+  plotBoth("spectrum", logs, both(spectrum), periods.map((um) => [-Math.log10(um), `${um} µm`]));
+  const rings = profile.ours.map((_, i) => i + 1);
+  plotBoth("profile", rings, both(profile), [[1.3, "border"], [9.7, "centre"]]);
+  const round = (value) => Number(value.toPrecision(3));
+  const sorted = [...scalars].sort((a, b) => b.difference - a.difference).slice(0, BARS);
+  const rows = sorted.map(({ description, ours, theirs, difference }) => {
+    const bar = Object.assign(document.createElement("meter"), { min: 0, max: 1, value: difference });
+    bar.setAttribute("aria-label", `${description}, relative difference`);
+    const text = made("span", `${round(ours)} · ${round(theirs)}`, "value");
+    return made("li", [made("span", description), text, bar]);
+  });
+  element("distances").replaceChildren(...rows);
 }
 
 element("real-file").addEventListener("change", ({ target }) => useReal(target.files[0]));

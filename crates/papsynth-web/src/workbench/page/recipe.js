@@ -7,7 +7,7 @@ let info = null;
 
 const state = { preset: "lbc", base: null, recipe: null, seed: 0, index: 0 };
 
-/** Recipes before and after the present one; the field that changes without a new entry in `past`. */
+/** Presets and recipes before and after the present ones; the field that changes without a new entry in `past`. */
 const past = [];
 const future = [];
 let moving = null;
@@ -60,17 +60,28 @@ function removed(value, [key, ...rest]) {
 /** Called after every change; set by workbench.js. */
 let changed = () => {};
 
+const snapshot = () => ({ preset: state.preset, base: state.base, recipe: state.recipe });
+
 /** Replaces the recipe. Changes with the same `name`, until `settle`, are undone together. */
 function setRecipe(recipe, name = null) {
   if (equal(recipe, state.recipe)) return;
   if (name === null || moving !== name) {
-    past.push(state.recipe);
+    past.push(snapshot());
     if (past.length > 500) past.shift();
     future.length = 0;
   }
   moving = name;
   state.recipe = recipe;
   changed(name);
+}
+
+/** Replaces the recipe by a preset. */
+function setPreset({ name, recipe }) {
+  settle();
+  past.push(snapshot());
+  future.length = 0;
+  Object.assign(state, { preset: name, base: recipe, recipe });
+  changed(null);
 }
 
 const settle = () => { moving = null; };
@@ -81,8 +92,8 @@ const edit = (path, value, name = null) => setRecipe(replaced(state.recipe, path
 function travel(from, to) {
   if (from.length === 0) return;
   settle();
-  to.push(state.recipe);
-  state.recipe = from.pop();
+  to.push(snapshot());
+  Object.assign(state, from.pop());
   changed(null);
 }
 const undo = () => travel(past, future);

@@ -168,12 +168,8 @@ function setColour(on) {
 }
 
 element("preset").addEventListener("change", ({ target }) => {
-  const { name, recipe } = info.presets.find((preset) => preset.name === target.value);
-  Object.assign(state, { preset: name, base: recipe });
-  settle();
   isPlaced = false;
-  setRecipe(recipe);
-  changed(null);
+  setPreset(info.presets.find(({ name }) => name === target.value));
 });
 element("seed").addEventListener("change", ({ target }) => {
   state.seed = clamp(Math.floor(Number(target.value)) || 0, 0, Number.MAX_SAFE_INTEGER);
@@ -214,9 +210,10 @@ const KEYS = {
 
 document.addEventListener("keydown", (event) => {
   const isText = event.target instanceof HTMLTextAreaElement || (event.target instanceof HTMLInputElement && ["text", "search", "number"].includes(event.target.type));
-  if ((event.ctrlKey || event.metaKey) && !event.altKey && event.key.toLowerCase() === "z" && !isText) {
+  const letter = event.key.toLowerCase();
+  if ((event.ctrlKey || event.metaKey) && !event.altKey && (letter === "z" || letter === "y") && !isText) {
     event.preventDefault();
-    if (event.shiftKey) redo(); else undo();
+    if (event.shiftKey || letter === "y") redo(); else undo();
     return;
   }
   if (!image || event.ctrlKey || event.metaKey || event.altKey || isText) return;
