@@ -48,13 +48,14 @@ pub(crate) fn view(args: &View) -> Result<(), ExitError> {
 pub(crate) fn workbench(args: &Workbench) -> Result<(), ExitError> {
     let setup = Setup::load(&args.engine, None)?;
     preview::check_memory(&setup)?;
-    setup.threads_of_a_frame();
+    let threads = setup.threads_of_a_frame();
     let params = papsynth_web::WorkbenchParams {
         recipe: setup.recipe.recipe,
         preset: args.engine.recipe.preset.unwrap_or(Preset::Lbc),
         model: setup.model,
         inputs: Inputs { weight_map: setup.engine.weight_map().cloned(), ..Inputs::default() },
         seed: args.engine.seed,
+        threads,
         max_memory: memory::limit(args.max_memory),
     };
     let workbench = papsynth_web::Workbench::new(params)?;

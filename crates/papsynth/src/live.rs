@@ -224,6 +224,8 @@ impl Live {
                 }
             }
         }
+        // The flag no longer cancels anything: the image is complete.
+        rendering.work_mut().cancellation = Cancellation::default();
         self.last = Last::Image(Box::new(rendering));
         Ok(LiveImage { planes, made })
     }

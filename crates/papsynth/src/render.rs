@@ -289,6 +289,10 @@ impl Rendering {
         &self.work
     }
 
+    pub(crate) fn work_mut(&mut self) -> &mut Work {
+        &mut self.work
+    }
+
     /// Returns the scene.
     pub(crate) fn scene(&self) -> &Scene {
         &self.parts.scene

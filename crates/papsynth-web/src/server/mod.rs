@@ -196,6 +196,14 @@ async fn accept<S: Site + Send + 'static>(
 
 async fn answer<S: Site>(shared: &Shared<S>, request: hyper::Request<Incoming>) -> Reply {
     let (head, body) = request.into_parts();
+    // An absolute URI would name a second host.
+    if head.uri.authority().is_some() {
+        return Reply::error(400, "expected a path, not an absolute URI");
+    }
+    // Before the body, so that other sites cannot send long ones.
+    if let Some(error) = shared.origin.rejects(&head.headers) {
+        return error;
+    }
     let max_body = shared.site().max_body();
     if body.size_hint().lower() > max_body as u64 {
         return Reply::error(413, "the request body is too long");
@@ -209,13 +217,6 @@ async fn answer<S: Site>(shared: &Shared<S>, request: hyper::Request<Incoming>) 
         },
         _ => Bytes::new(),
     };
-    // An absolute URI would name a second host.
-    if head.uri.authority().is_some() {
-        return Reply::error(400, "expected a path, not an absolute URI");
-    }
-    if let Some(error) = shared.origin.rejects(&head.headers) {
-        return error;
-    }
     let target = head.uri.path_and_query().map_or("", |target| target.as_str());
     let request = Request {
         method: head.method.as_str(),

@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use papsynth::model::Model;
 use papsynth::recipe::{CameraPreset, Preset, Recipe};
 use papsynth::truth::Group;
-use papsynth::{Inputs, white_level};
+use papsynth::{Inputs, Threads, white_level};
 use serde::Deserialize;
 use serde_json::json;
 
@@ -37,7 +37,7 @@ const PAGE: [File; 8] = [
 const MAX_RECIPE: usize = 1 << 20;
 
 /// Maximum length of an image in a request, bytes.
-const MAX_IMAGE: usize = 1 << 28;
+const MAX_IMAGE: usize = 1 << 27;
 
 /// What a workbench starts with.
 #[derive(Debug, Clone)]
@@ -52,6 +52,8 @@ pub struct WorkbenchParams {
     pub inputs: Inputs,
     /// Seed of the first image.
     pub seed: u64,
+    /// Threads that render an image.
+    pub threads: Threads,
     /// Memory for images, bytes; `None` for no limit.
     pub max_memory: Option<u64>,
 }

@@ -71,6 +71,7 @@ const LIGHT_MEMORY: f64 = 0.125;
 /// Renders images.
 pub(super) struct Renderer {
     model: Model,
+    threads: Threads,
     max_memory: Option<u64>,
     /// The images in progress or waiting.
     pending: Mutex<Vec<Cancellation>>,
@@ -108,6 +109,7 @@ impl Renderer {
         let lives = [live()?, live()?, live()?];
         Ok(Self {
             model: params.model.clone(),
+            threads: params.threads,
             max_memory: params.max_memory,
             pending: Mutex::default(),
             sessions: Mutex::new(Sessions { lives, count: 0 }),
@@ -143,7 +145,7 @@ impl Renderer {
             return header(&json!({ "cancelled": true }));
         }
         let start = now();
-        match image(&mut sessions.lives[asked.view as usize], asked, cancellation) {
+        match image(&mut sessions.lives[asked.view as usize], asked, self.threads, cancellation) {
             Ok((scene, planes_um, LiveImage { mut planes, made })) => {
                 let Some(plane) = planes.pop() else { return Reply::error(500, "the image has no plane") };
                 let ms = start.elapsed().as_secs_f64() * 1e3;
@@ -281,6 +283,7 @@ fn gone() -> Reply {
 fn image(
     live: &mut Live,
     asked: &RenderRequest,
+    threads: Threads,
     cancellation: &Cancellation,
 ) -> Result<(Scene, Vec<f64>, LiveImage), papsynth::Error> {
     let mut scene = live.scene(&asked.recipe, Key { seed: asked.seed, index: asked.index })?;
@@ -292,7 +295,7 @@ fn image(
     // The sharpest plane of each object does not depend on the position of a fused image.
     let focus_um = asked.focus_um.filter(|um| um.is_finite() && scene.fusion.is_none());
     scene.planes_um = vec![focus_um.map_or(middle, |um| um.clamp(-MAX_FOCUS_UM, MAX_FOCUS_UM))];
-    let image = live.image(&asked.recipe, scene.clone(), Threads::All, cancellation)?;
+    let image = live.image(&asked.recipe, scene.clone(), threads, cancellation)?;
     Ok((scene, all_um, image))
 }
 

@@ -7,7 +7,7 @@ use papsynth::live::Live;
 use papsynth::model::Model;
 use papsynth::recipe::{Preset, Recipe};
 use papsynth::truth::Group;
-use papsynth::{Engine, Inputs};
+use papsynth::{Engine, Inputs, Threads};
 use papsynth_web::{JSON, MAX_BODY, Reply, Request, Site, Workbench, WorkbenchParams};
 use serde_json::{Value, json};
 
@@ -15,7 +15,8 @@ use crate::support::view::{Pixels, recipe};
 
 fn workbench(recipe: Recipe, max_memory: Option<u64>) -> Workbench {
     let (model, inputs) = (Model::builtin(), Inputs::default());
-    Workbench::new(WorkbenchParams { recipe, preset: Preset::Lbc, model, inputs, seed: 5, max_memory }).unwrap()
+    let (preset, threads) = (Preset::Lbc, Threads::All);
+    Workbench::new(WorkbenchParams { recipe, preset, model, inputs, seed: 5, threads, max_memory }).unwrap()
 }
 
 /// Replies as the server does.

@@ -30,7 +30,9 @@ fn check(live: &mut Live, recipe: &Recipe, key: Key) -> Made {
     let engine = Engine::new(recipe, &Model::builtin(), &Inputs::default()).unwrap();
     let expected = engine.frame(key).unwrap();
     let scene = live.scene(recipe, key).unwrap();
-    let found = live.image(recipe, scene, Threads::All, &Cancellation::default()).unwrap();
+    let flag = Cancellation::default();
+    let found = live.image(recipe, scene, Threads::All, &flag).unwrap();
+    flag.cancel();
     assert!(found.planes == expected.planes, "the planes differ\n{}", recipe.to_toml());
     let finished = live.finish().unwrap().unwrap();
     assert_eq!(finished.scene, expected.finished.scene);
@@ -50,6 +52,7 @@ fn numbers(value: &Value, path: &str, found: &mut Vec<String>) {
 }
 
 /// Multiplies one number of a recipe. Returns `None` if the result is invalid or has too many objects.
+#[expect(clippy::cast_possible_truncation, reason = "numbers of recipes are small")]
 fn scaled(recipe: &Recipe, choice: prop::sample::Index, factor: f64) -> Option<Recipe> {
     let mut value = serde_json::to_value(recipe).unwrap();
     let mut paths = Vec::new();

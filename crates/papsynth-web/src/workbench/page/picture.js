@@ -52,12 +52,12 @@ function painted({ head, levels }) {
 
 let dirty = false;
 let running = false;
-/** Names of the last change and the time of its last image, ms: fast changes need no reduced image. */
+/** Name of the last change, and the times of the images of each, ms: fast changes need no reduced image. */
 let lastName = null;
-let lastMs = Infinity;
+const costs = new Map();
 
-/** Longest time of an image without a reduced one before it, ms. */
-const FAST_MS = 90;
+/** Longest time of an image without a reduced one before it, ms, and the fraction of a time that stays with each image. */
+const [FAST_MS, STAYS] = [80, 0.9];
 
 function say(text) {
   element("message").textContent = text;
@@ -82,7 +82,6 @@ function offerSmaller(ms) {
 
 /** Requests an image of the present state. `name` is that of the changed field. */
 function render(name = null) {
-  if (name === null || name !== lastName) lastMs = Infinity;
   lastName = name;
   dirty = true;
   document.body.dataset.ready = false;
@@ -95,7 +94,8 @@ async function run() {
   try {
     while (dirty) {
       dirty = false;
-      if (lastMs > FAST_MS && !(await renderKind("reduced"))) continue;
+      const isFast = lastName !== null && (costs.get(lastName) ?? Infinity) < FAST_MS;
+      if (!isFast && !(await renderKind("reduced"))) continue;
       if (dirty) continue;
       await renderKind("full");
     }
@@ -117,7 +117,7 @@ async function renderKind(kind) {
   }
   say("");
   showFaults([]);
-  if (kind === "full") lastMs = head.ms;
+  if (kind === "full") costs.set(lastName, Math.max(head.ms, STAYS * (costs.get(lastName) ?? 0)));
   show(reply);
   if (kind === "reduced" && FULL_FACTOR * head.ms > SLOW_MS) offerSmaller(FULL_FACTOR * head.ms);
   return true;

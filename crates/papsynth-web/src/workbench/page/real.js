@@ -84,7 +84,8 @@ function plot(id, curves, labels) {
     if (d) svg.append(drawn("path", { d: `M${d}`, class: name }));
   }
   for (const [x, text] of labels) {
-    const label = drawn("text", { x: clamp(x * width, 8, width - 12), y: height - 3, "text-anchor": "middle" });
+    const anchor = x < 0.06 ? "start" : x > 0.94 ? "end" : "middle";
+    const label = drawn("text", { x: clamp(x * width, 2, width - 2), y: height - 3, "text-anchor": anchor });
     label.textContent = text;
     svg.append(label);
   }
@@ -101,7 +102,7 @@ function showReal() {
   const [a, b] = [fractions(shown), fractions(real)].map(histogramOf);
   const most = Math.max(...a, ...b);
   const bars = (counts) => Array.from(counts, (count, i) => [(i + 0.5) / BINS, Math.sqrt(count / most)]);
-  plot("histogram", [[bars(b), "theirs"], [bars(a), "ours"]], [[0.01, "0"], [0.5, "50 %"], [0.96, "100 %"]]);
+  plot("histogram", [[bars(b), "theirs"], [bars(a), "ours"]], [[0, "0"], [0.5, "50 %"], [1, "100 %"]]);
   element("measured").hidden = !info.compares;
   clearTimeout(comparing);
   if (info.compares) comparing = setTimeout(compare, COMPARE_MS);
@@ -135,7 +136,7 @@ function showCompared({ scalars, spectrum, profile }) {
   const periods = [30, 10, 3, 1].filter((um) => -Math.log10(um) > logs[0] && -Math.log10(um) < logs.at(-1));
   plotBoth("spectrum", logs, both(spectrum), periods.map((um) => [-Math.log10(um), `${um} µm`]));
   const rings = profile.ours.map((_, i) => i + 1);
-  plotBoth("profile", rings, both(profile), [[1.3, "border"], [9.7, "centre"]]);
+  plotBoth("profile", rings, both(profile), [[1, "border"], [10, "centre"]]);
   const round = (value) => Number(value.toPrecision(3));
   const sorted = [...scalars].sort((a, b) => b.difference - a.difference).slice(0, BARS);
   const rows = sorted.map(({ description, ours, theirs, difference }) => {
