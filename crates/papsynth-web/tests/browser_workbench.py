@@ -2,8 +2,8 @@
 
 Usage: browser_workbench.py PAPSYNTH CHROMIUM FOLDER [--times]
 
-FOLDER is emptied; screenshots and images go there. With --times, prints the times from a change of the default recipe to its
-image in the browser instead.
+FOLDER is emptied; screenshots and images go there. With --times, prints the times from a change of the default recipe
+to its image in the browser instead.
 """
 
 import hashlib
@@ -165,7 +165,8 @@ def check_preset(browser):
         const blob = await (await fetch(`image.png/${shown.head.id}`)).blob();
         await useReal(new File([blob], "own.png"));
     })()""")
-    browser.until("document.querySelectorAll('#distances meter').length > 5", lambda: browser.run("document.body.innerText"))
+    text = "document.body.innerText"
+    browser.until("document.querySelectorAll('#distances meter').length > 5", lambda: browser.run(text))
     assert browser.run("[...document.querySelectorAll('#distances meter')].every((meter) => meter.value === 0)")
     browser.click("#real-remove")
     browser.until("element('real-shown').hidden")
@@ -200,7 +201,8 @@ TIMES = """(async () => {
             firsts.push(first);
             wholes.push(performance.now() - start);
         }
-        rows.push([name, median(firsts), median(wholes), Math.round(Math.min(...firsts)), Math.round(Math.min(...wholes))]);
+        const least = (values) => Math.round(Math.min(...values));
+        rows.push([name, median(firsts), median(wholes), least(firsts), least(wholes)]);
     }
     return rows;
 })()"""

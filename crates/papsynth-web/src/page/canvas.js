@@ -1,8 +1,8 @@
 "use strict";
 
-// The canvas of an image, with pan and zoom, for the viewer and the workbench. The centre of the canvas is (view.x, view.y) in
-// image pixels; view.zoom is the number of page pixels per image pixel. A page defines draw(), look(x, y) for a clicked pixel,
-// focusBy(steps), and pointAt(x, y) for the pixel under the pointer, which may be null.
+// The canvas of an image, with pan and zoom, for the viewer and the workbench. The centre of the canvas is
+// (view.x, view.y) in image pixels; view.zoom is the number of page pixels per image pixel. A page defines draw(),
+// look(x, y) for a clicked pixel, focusBy(steps), and pointAt(x, y) for the pixel under the pointer.
 
 /** Maximum zoom; pointer movement allowed in a click. */
 const [NEAREST, CLICK_PX] = [32, 4];

@@ -22,10 +22,11 @@ use crate::view::{excerpt, number};
 use real::RealImage;
 use rendering::{RenderRequest, Renderer};
 
-const PAGE: [File; 8] = [
+const PAGE: [File; 9] = [
     ("/", HTML, include_str!("page/index.html")),
     ("/workbench.css", CSS, include_str!("page/workbench.css")),
     ("/recipe.js", JS, include_str!("page/recipe.js")),
+    ("/numbers.js", JS, include_str!("page/numbers.js")),
     ("/form.js", JS, include_str!("page/form.js")),
     ("/picture.js", JS, include_str!("page/picture.js")),
     ("/real.js", JS, include_str!("page/real.js")),
@@ -96,7 +97,9 @@ impl Workbench {
     fn info(&self) -> Reply {
         let preset =
             |preset: Preset| json!({ "name": preset.name(), "summary": preset.summary(), "recipe": preset.recipe() });
-        let camera = |camera: CameraPreset| json!({ "name": camera.name(), "summary": camera.summary(), "camera": camera.camera() });
+        let camera = |camera: CameraPreset| {
+            json!({ "name": camera.name(), "summary": camera.summary(), "camera": camera.camera() })
+        };
         Reply::json(&json!({
             "version": env!("CARGO_PKG_VERSION"),
             "schema": Recipe::schema(),

@@ -5,7 +5,8 @@ use papsynth::recipe::diagnose::{self, FieldError};
 use papsynth::recipe::{InvalidField, Recipe};
 use serde_json::{Value, json};
 
-/// Reads a recipe. Returns `{"recipe": …, "sections": …}` with the names of the sections in the text, or `{"errors": …}` with the line of each error.
+/// Reads a recipe. Returns `{"recipe": …, "sections": …}` with the names of the sections in the text, or
+/// `{"errors": …}` with the line of each error.
 pub(super) fn checked(text: &str, model: &Model) -> Value {
     match diagnose::read(text) {
         Err(errors) => json!({ "errors": errors.iter().map(|error| located(text, error)).collect::<Vec<_>>() }),

@@ -129,8 +129,10 @@ impl Renderer {
         cancellation
     }
 
-    /// Returns an image: the length of the JSON that describes it (32 bits, least byte first), the JSON, and the samples,
-    /// with 8 bits or with 16 bits, least byte first. A cancelled image is `{"cancelled": true}`, an invalid recipe
+    /// Returns an image: the length of the JSON that describes it (32 bits, least byte first), the JSON, and the
+    /// samples, with 8 bits or with 16 bits, least byte first.
+    ///
+    /// A cancelled image is `{"cancelled": true}`, an invalid recipe
     /// `{"errors": …}`.
     pub(super) fn render(&self, asked: &RenderRequest, cancellation: &Cancellation) -> Reply {
         let errors = recipes::errors(&asked.recipe, &self.model);
@@ -180,7 +182,8 @@ impl Renderer {
             }
             Err(papsynth::Error::Image { cause: ErrorKind::Cancelled, .. }) => header(&json!({ "cancelled": true })),
             Err(papsynth::Error::Recipe(problems)) => {
-                let error = |p: &InvalidField| json!({ "path": p.field.split('.').collect::<Vec<_>>(), "message": p.to_string() });
+                let path = |problem: &InvalidField| problem.field.split('.').map(str::to_owned).collect::<Vec<_>>();
+                let error = |problem: &InvalidField| json!({ "path": path(problem), "message": problem.to_string() });
                 header(&json!({ "errors": problems.iter().map(error).collect::<Vec<_>>() }))
             }
             Err(error) => header(&json!({ "errors": [{ "path": [], "message": error.to_string() }] })),

@@ -1,4 +1,4 @@
-//! An image of `Live` has the same bytes as that of a new engine, whatever images were made before it.
+//! An image of `Live` has the same bytes as that of a new engine. It does not depend on the images before it.
 
 use papsynth::key::Key;
 use papsynth::live::{Cancellation, Live, Made};

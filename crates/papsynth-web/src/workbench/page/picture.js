@@ -22,7 +22,8 @@ function unframed(buffer) {
 
 async function requestImage(kind, index) {
   const { recipe, seed } = state;
-  const body = { recipe, seed, index, view: kind, focus_um: kind === "small" ? null : focus, noise_free: element("noise-free").checked };
+  const [focus_um, noise_free] = [kind === "small" ? null : focus, element("noise-free").checked];
+  const body = { recipe, seed, index, view: kind, focus_um, noise_free };
   return unframed(await (await request("render", body)).arrayBuffer());
 }
 
@@ -56,7 +57,7 @@ let running = false;
 let lastName = null;
 const costs = new Map();
 
-/** Longest time of an image without a reduced one before it, ms, and the fraction of a time that stays with each image. */
+/** Longest time of an image without a reduced one before it, ms; fraction of a time that stays with each image. */
 const [FAST_MS, STAYS] = [80, 0.9];
 
 function say(text) {
@@ -66,7 +67,7 @@ function say(text) {
 
 const status = (text) => { element("status").textContent = text; };
 
-/** Time of an image relative to that of its reduced image, at least; time beyond which a smaller field is offered, ms. */
+/** Least time of an image relative to its reduced image; time beyond which a smaller field is offered, ms. */
 const [FULL_FACTOR, SLOW_MS] = [3.5, 4000];
 
 /** Says how long the image takes, and offers a smaller field. */
@@ -217,8 +218,8 @@ async function look(x, y) {
     const { objects } = await (await request(`at/${shown.head.id}/${x}/${y}`)).json();
     if (mark?.x !== x || mark?.y !== y) return;
     const plain = (node, values, unit) => { node.textContent = `${minus(values[0], 1)}${unit}`; };
-    const nodes = objects.length ? objects.map((object) => card(object, plain)) : [made("p", "No object here.", "quiet")];
-    element("objects").replaceChildren(...nodes);
+    const none = made("p", "No object here.", "quiet");
+    element("objects").replaceChildren(...(objects.length ? objects.map((object) => card(object, plain)) : [none]));
   } catch (error) {
     if (error.status !== 404) element("objects").replaceChildren(made("p", error.message, "quiet"));
   }
@@ -325,7 +326,8 @@ function showFacts() {
   ];
   const cell = made("dd", "…", "hash");
   cell.id = "hash";
-  element("facts").replaceChildren(...rows.flatMap(([name, value]) => [made("dt", name), made("dd", String(value))]), made("dt", "SHA-256"), cell);
+  const cells = rows.flatMap(([name, value]) => [made("dt", name), made("dd", String(value))]);
+  element("facts").replaceChildren(...cells, made("dt", "SHA-256"), cell);
   status(`Field ${state.index} of seed ${state.seed}: ${head.objects} objects, ${head.ms.toFixed(0)} ms.`);
 }
 

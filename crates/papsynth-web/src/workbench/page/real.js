@@ -10,7 +10,8 @@ const realUm = () => Number(element("real-um").value) || 0.25;
 async function useReal(file) {
   if (!file) return;
   try {
-    const response = await fetch("real", { method: "POST", body: file, headers: { "Content-Type": "application/octet-stream" } });
+    const headers = { "Content-Type": "application/octet-stream" };
+    const response = await fetch("real", { method: "POST", body: file, headers });
     if (!response.ok) throw new Error((await response.json()).error);
     const reply = unframed(await response.arrayBuffer());
     real = { ...reply, canvas: painted(reply), name: file.name };
@@ -49,7 +50,8 @@ function drawReal() {
 function fitBoth() {
   if (!image || !real) return;
   const scale = realUm() / image.pixel_um;
-  const [width, height] = [image.width + GAP_PX + real.head.width * scale, Math.max(image.height, real.head.height * scale)];
+  const width = image.width + GAP_PX + real.head.width * scale;
+  const height = Math.max(image.height, real.head.height * scale);
   const zoom = 0.96 * Math.min(canvas.clientWidth / width, canvas.clientHeight / height);
   Object.assign(view, { x: Math.min(width / 2, image.width), y: height / 2, zoom });
   // The centre of the view is inside the field, so both fit if the zoom is halved where needed.
@@ -120,12 +122,14 @@ async function compare() {
 }
 
 /** Draws two curves of the judge on common axes. */
-function plotBoth(id, at_, { ours, theirs }, labels) {
+function plotBoth(id, places, { ours, theirs }, labels) {
   const values = [...ours, ...theirs].filter(Number.isFinite);
   const [low, high] = [Math.min(...values), Math.max(...values)];
-  const [left, right] = [Math.min(...at_), Math.max(...at_)];
+  const [left, right] = [Math.min(...places), Math.max(...places)];
   const x = (value) => (value - left) / (right - left || 1);
-  const points = (curve_) => curve_.map((value, i) => [x(at_[i]), 0.04 + 0.92 * ((value - low) / (high - low || 1))]).filter(([, y]) => Number.isFinite(y));
+  const y = (value) => 0.04 + 0.92 * ((value - low) / (high - low || 1));
+  const isKnown = (point) => Number.isFinite(point[1]);
+  const points = (line) => line.map((value, i) => [x(places[i]), y(value)]).filter(isKnown);
   plot(id, [[points(theirs), "theirs"], [points(ours), "ours"]], labels.map(([value, text]) => [x(value), text]));
 }
 

@@ -136,7 +136,10 @@ function commandLine() {
 /** Returns a value in Python. */
 function python(value) {
   if (Array.isArray(value)) return `[${value.map(python).join(", ")}]`;
-  if (isTable(value)) return `{${Object.entries(value).map(([k, v]) => `${JSON.stringify(k)}: ${python(v)}`).join(", ")}}`;
+  if (isTable(value)) {
+    const fields = Object.entries(value).map(([name, inner]) => `${JSON.stringify(name)}: ${python(inner)}`);
+    return `{${fields.join(", ")}}`;
+  }
   if (typeof value === "boolean") return value ? "True" : "False";
   return typeof value === "string" ? JSON.stringify(value) : String(value);
 }
@@ -144,7 +147,8 @@ function python(value) {
 /** Returns the lines of Python that make the field. */
 function pythonLines() {
   const sets = settings();
-  const lines = sets.map(([path, value]) => `recipe${path.map((name) => `[${JSON.stringify(name)}]`).join("")} = ${python(value)}`);
+  const place = (path) => path.map((name) => `[${JSON.stringify(name)}]`).join("");
+  const lines = sets.map(([path, value]) => `recipe${place(path)} = ${python(value)}`);
   return [
     "import papsynth",
     `recipe = papsynth.recipe(${JSON.stringify(state.preset)})`,

@@ -29,7 +29,8 @@ function showErrors(errors) {
   element("lines").replaceChildren(...lines);
   element("text").toggleAttribute("aria-invalid", errors.length > 0);
   const items = errors.map(({ line, message, help }) => {
-    const button = Object.assign(made("button", [line ? made("b", `Line ${line}: `) : "", message], "plain"), { type: "button" });
+    const button = made("button", [line ? made("b", `Line ${line}: `) : "", message], "plain");
+    button.type = "button";
     button.addEventListener("click", () => goToLine(line ?? 1));
     return made("li", [button, ...(help ? [made("p", help, "quiet")] : [])]);
   });
@@ -163,8 +164,7 @@ function setColour(on) {
   const base = state.base.light;
   const kinds = resolved(info.schema.properties.light).oneOf;
   const kind = kinds.find((one) => one.properties.kind.const === (on ? "colour" : "monochrome"));
-  const fields = Object.entries(kind.properties).map(([name, field]) => [name, name === "kind" ? field.const : field.default]);
-  edit(["light"], base.kind === kind.properties.kind.const ? base : Object.fromEntries(fields));
+  edit(["light"], base.kind === kind.properties.kind.const ? base : defaultsOf(kind));
 }
 
 element("preset").addEventListener("change", ({ target }) => {
@@ -209,7 +209,9 @@ const KEYS = {
 };
 
 document.addEventListener("keydown", (event) => {
-  const isText = event.target instanceof HTMLTextAreaElement || (event.target instanceof HTMLInputElement && ["text", "search", "number"].includes(event.target.type));
+  const { target } = event;
+  const isText = target instanceof HTMLTextAreaElement
+    || (target instanceof HTMLInputElement && ["text", "search", "number"].includes(target.type));
   const letter = event.key.toLowerCase();
   if ((event.ctrlKey || event.metaKey) && !event.altKey && (letter === "z" || letter === "y") && !isText) {
     event.preventDefault();
@@ -248,7 +250,8 @@ async function begin() {
     return;
   }
   element("version").textContent = `papsynth ${info.version}`;
-  element("preset").replaceChildren(...info.presets.map(({ name, summary }) => Object.assign(made("option", name), { value: name, title: summary })));
+  const presets = selectOf(info.presets.map(({ name, summary }) => [name, name, summary]));
+  element("preset").replaceChildren(...presets.children);
   info.groups.forEach(addLayer);
   makeStrip();
   const { recipe: base } = info.presets.find(({ name }) => name === info.preset);
