@@ -160,12 +160,12 @@ impl Live {
         scene::draw(recipe, &self.model, self.weight_map.as_ref(), key)
     }
 
-    /// Images a scene of a recipe, as [`Engine::image`](crate::Engine::image). What the last scenes have in common with
-    /// it is kept from them.
+    /// Images a scene of a recipe, as [`Engine::image`](crate::Engine::image). What the last scene has in common with
+    /// it is kept.
     ///
     /// # Errors
-    /// If the recipe or the scene is invalid, or with [`ErrorKind::Cancelled`] if `cancellation` is set. After an error,
-    /// what was completed is kept.
+    /// If the recipe or the scene is invalid, or with [`ErrorKind::Cancelled`] if `cancellation` is set. After an
+    /// error, what was completed is kept.
     pub fn image(
         &mut self,
         recipe: &Recipe,
@@ -187,8 +187,8 @@ impl Live {
         self.render(scene, &work).map_err(|cause| Error::Image { index, cause })
     }
 
-    /// Returns the ground truth of the last image, and the all-in-focus image if it is a focus stack; `None` if the last
-    /// image was not completed.
+    /// Returns the ground truth of the last image, and the all-in-focus image if it is a focus stack; `None` if the
+    /// last image was not completed.
     ///
     /// # Errors
     /// As [`image`](Self::image).
@@ -344,7 +344,7 @@ fn identity(object: &Object) -> (&'static str, u64) {
     (object.body.kind().name(), object.number)
 }
 
-/// Returns whether two objects of one [`PhantomScene`](crate::phantom::PhantomScene) have the same phantom, which does not
+/// Returns whether two objects have the same phantom in one [`PhantomScene`](crate::phantom::PhantomScene). It does not
 /// depend on depth, id and group.
 fn has_same_phantom(last: &Object, object: &Object) -> bool {
     let Object { id, cluster, depth_um, .. } = *last;

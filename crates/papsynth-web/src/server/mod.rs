@@ -58,8 +58,8 @@ pub trait Site {
         MAX_BODY
     }
 
-    /// Returns the work that computes the reply to a request, or `None` if [`reply`](Self::reply) is fast. The work runs
-    /// on its own thread, while the site replies to other requests.
+    /// Returns the work that computes the reply to a request, or `None` if [`reply`](Self::reply) is fast. The work
+    /// runs on its own thread, while the site replies to other requests.
     fn slow_reply(&mut self, _request: &Request) -> Option<SlowReply> {
         None
     }

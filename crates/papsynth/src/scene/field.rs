@@ -140,7 +140,7 @@ impl Scene {
     }
 
     /// Returns the same objects in an image with pixels `factor` times as large, and one sample of the slide for each
-    /// pixel: a preview that is computed several times faster. Its border is that of the image, rounded to whole pixels.
+    /// pixel: a preview that is computed several times faster. Width and height are rounded down to whole pixels.
     #[must_use]
     pub fn reduced(mut self, factor: usize) -> Self {
         let View { width, height, pixel_um } = self.view;
