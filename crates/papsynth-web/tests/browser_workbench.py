@@ -180,18 +180,18 @@ TIMES = """(async () => {
     const until = async () => { while (running || dirty || shown.head.factor > 1) await wait(); };
     const base = state.recipe;
     const CHANGES = {
-        camera: (k) => edit(["camera", "read_noise_e"], 100 + k),
+        camera: (k) => edit(["camera", "read_noise_e"], 100 + k, "camera"),
         focus: (k) => setFocus(0.7 * (k + 1)),
-        optics: (k) => edit(["optics", "condenser_na"], 0.3 + 0.01 * k),
-        debris: (k) => edit(["debris", "speckles", "count"], 20 + 5 * k),
-        cells: (k) => edit(["cells", "intermediate", "count"], { per_mm2: 110 + 10 * k }),
-        stain: (k) => edit(["stain", "slide_cytoplasm"], 0.6 + 0.05 * k),
+        optics: (k) => edit(["optics", "condenser_na"], 0.3 + 0.01 * k, "optics"),
+        debris: (k) => edit(["debris", "speckles", "count"], 20 + 5 * k, "debris"),
+        cells: (k) => edit(["cells", "intermediate", "count"], { per_mm2: 110 + 10 * k }, "cells"),
+        stain: (k) => edit(["stain", "slide_cytoplasm"], 0.6 + 0.05 * k, "stain"),
     };
     const median = (values) => Math.round(values.sort((a, b) => a - b)[values.length >> 1]);
     const rows = [];
     for (const [name, change] of Object.entries(CHANGES)) {
         const [firsts, wholes] = [[], []];
-        for (let k = 0; k < 7; k += 1) {
+        for (let k = 0; k < 9; k += 1) {
             setFocus(null);
             setRecipe(base);
             await until();
