@@ -1,5 +1,6 @@
 //! The workbench: a recipe and its image, for experiments with every number. It writes nothing.
 
+mod colouring;
 #[cfg(feature = "judge")]
 mod compare;
 mod real;
@@ -19,6 +20,7 @@ use crate::error::Error;
 use crate::page::{self, CSS, File, HTML, JS};
 use crate::server::{Reply, Request, Site, SlowReply};
 use crate::view::{excerpt, number};
+use colouring::Colouring;
 use real::RealImage;
 use rendering::{RenderRequest, Renderer};
 
@@ -97,9 +99,7 @@ impl Workbench {
     fn info(&self) -> Reply {
         let preset =
             |preset: Preset| json!({ "name": preset.name(), "summary": preset.summary(), "recipe": preset.recipe() });
-        let camera = |camera: CameraPreset| {
-            json!({ "name": camera.name(), "summary": camera.summary(), "camera": camera.camera() })
-        };
+        let camera = |camera: CameraPreset| json!({ "name": camera.name(), "summary": camera.summary(), "camera": camera.camera() });
         Reply::json(&json!({
             "version": env!("CARGO_PKG_VERSION"),
             "schema": Recipe::schema(),
@@ -127,13 +127,7 @@ impl Workbench {
                 let text = if commented { recipe.to_commented_toml() } else { recipe.to_toml() };
                 Ok(Reply::json(&json!({ "text": text })))
             }
-            ("POST", ["real"]) => {
-                let image = RealImage::decode(request)?;
-                let reply = image.reply();
-                *self.real.lock().unwrap_or_else(PoisonError::into_inner) = Some(image);
-                Ok(reply)
-            }
-            (_, ["info" | "at" | "labels" | "image.png" | "mask", ..]) => Err(Reply::wrong_method("GET")),
+            (_, ["info" | "at" | "labels" | "legend" | "image.png" | "mask", ..]) => Err(Reply::wrong_method("GET")),
             (_, ["check" | "compare" | "print" | "real" | "render", ..]) => Err(Reply::wrong_method("POST")),
             _ => Err(Reply::error(404, "not found")),
         }
@@ -160,9 +154,24 @@ impl Workbench {
                 let (id, x, y) = (number(id)?, number(x)?, number(y)?);
                 Some(Box::new(move || renderer.objects_at(id, x, y).unwrap_or_else(|error| error)))
             }
-            ("GET", ["labels", id, group]) => {
-                let (id, group) = (number(id)?, group_of(group)?);
-                Some(Box::new(move || renderer.label_colours(id, group).unwrap_or_else(|error| error)))
+            ("GET", ["labels", id, by, group]) => {
+                let (id, by, group) = (number(id)?, colouring(by)?, group_of(group)?);
+                Some(Box::new(move || renderer.label_colours(id, group, by).unwrap_or_else(|error| error)))
+            }
+            ("GET", ["legend", id, by, group]) => {
+                let (id, by, group) = (number(id)?, colouring(by)?, group_of(group)?);
+                Some(Box::new(move || renderer.legend(id, by, group).unwrap_or_else(|error| error)))
+            }
+            ("POST", ["real"]) => {
+                let (image, real) = (RealImage::encoded(request)?, Arc::clone(&self.real));
+                Some(Box::new(move || {
+                    let decoded = RealImage::decode(&image).map(|image| {
+                        let reply = image.reply();
+                        *real.lock().unwrap_or_else(PoisonError::into_inner) = Some(image);
+                        reply
+                    });
+                    decoded.unwrap_or_else(|error| error)
+                }))
             }
             ("GET", ["mask", id, group]) => {
                 let (id, group) = (number(id)?, group_of(group)?);
@@ -189,6 +198,13 @@ impl Site for Workbench {
     fn slow_reply(&mut self, request: &Request) -> Option<SlowReply> {
         self.work(request).unwrap_or_else(|error| Some(Box::new(move || error)))
     }
+}
+
+fn colouring(name: &str) -> Result<Colouring, Reply> {
+    Colouring::by_name(name).ok_or_else(|| {
+        let message = format!("unknown colours `{}`; expected object, class or detectability", excerpt(name));
+        Reply::error(404, &message)
+    })
 }
 
 fn group_of(name: &str) -> Result<Group, Reply> {

@@ -21,12 +21,17 @@ pub(super) struct RealImage {
 }
 
 impl RealImage {
-    /// Decodes a PNG, JPEG or TIFF file.
-    pub(super) fn decode(request: &Request) -> Result<Self, Reply> {
-        if request.content_type != Some(BINARY) {
-            return Err(Reply::error(415, "expected content type application/octet-stream"));
+    /// Returns the file in a request.
+    pub(super) fn encoded(request: &Request) -> Result<Vec<u8>, Reply> {
+        match request.content_type == Some(BINARY) {
+            true => Ok(request.body.to_vec()),
+            false => Err(Reply::error(415, "expected content type application/octet-stream")),
         }
-        let image = LevelImage::decode(request.body, &Limits::default());
+    }
+
+    /// Decodes a PNG, JPEG or TIFF file.
+    pub(super) fn decode(file: &[u8]) -> Result<Self, Reply> {
+        let image = LevelImage::decode(file, &Limits::default());
         let image = image.map_err(|error| Reply::error(422, &error.to_string()))?;
         let brightest = image.levels.iter().copied().max().unwrap_or(0);
         let bits = match image.white > u16::from(u8::MAX) {

@@ -15,11 +15,12 @@ use papsynth_dataset::memory::MemoryEstimate;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
+use super::colouring::Colouring;
 use super::{WorkbenchParams, recipes};
 use crate::error::Error;
 use crate::server::Reply;
 use crate::view::grid::{Grid, Region};
-use crate::view::labels::Ids;
+use crate::view::labels::{Ids, colour, css};
 use crate::view::objects::objects_at;
 use crate::view::source::{check_pixel, png, png16};
 
@@ -249,13 +250,21 @@ impl Renderer {
     }
 
     /// Returns the labels of a group in colours, as PNG.
-    pub(super) fn label_colours(&self, id: usize, group: Group) -> Result<Reply, Reply> {
-        let (ids, region) = self.with_truth(id, |_, truth| {
+    pub(super) fn label_colours(&self, id: usize, group: Group, by: Colouring) -> Result<Reply, Reply> {
+        let (ids, region, colours) = self.with_truth(id, |_, truth| {
             let Grid { width, height, .. } = Grid::new(truth.width, truth.height, 1);
             let region = Region { rows: 0..height, columns: 0..width };
-            (Ids::new(&region, &region, &truth.labels(group).ids), region)
+            (Ids::new(&region, &region, &truth.labels(group).ids), region, by.colours(truth, group))
         })?;
-        png(&ids.rgba_with(OUTLINE_FILL), region.width(), 4)
+        let colour_of = |id: u32| colours.get(&id).copied().unwrap_or_else(|| colour(id));
+        png(&ids.rgba_with(OUTLINE_FILL, colour_of), region.width(), 4)
+    }
+
+    /// Returns the meaning of the colours of a group: pairs of colour and text.
+    pub(super) fn legend(&self, id: usize, by: Colouring, group: Group) -> Result<Reply, Reply> {
+        let entries = self.with_truth(id, |_, truth| by.legend(truth, group))?;
+        let entry = |(colour, text): &([u8; 3], String)| json!({ "colour": css(*colour), "text": text });
+        Ok(Reply::json(&entries.iter().map(entry).collect::<Vec<_>>()))
     }
 
     /// Returns the ids of a group as PNG with 16 bits, as in data sets.

@@ -1,5 +1,6 @@
 //! The workbench without a browser: its replies, and its pixels against those of an engine.
 
+use std::collections::BTreeSet;
 use std::thread;
 
 use papsynth::key::Key;
@@ -79,11 +80,21 @@ fn images_have_the_pixels_of_an_engine() {
         assert!(
             bytes.as_chunks().0.iter().map(|&two| u32::from(u16::from_be_bytes(two))).eq(labels.ids.iter().copied())
         );
-        let colours = Pixels::decode(&get(&mut workbench, &format!("/labels/{id}/{}.png", group.name())).body);
+        let colours = Pixels::decode(&get(&mut workbench, &format!("/labels/{id}/object/{}.png", group.name())).body);
         assert_eq!([colours.width, colours.height, colours.channels], [300, 270, 4]);
         let is_label = |k: usize| colours.bytes[4 * k + 3] > 0;
         assert!((0..300 * 270).all(|k| is_label(k) == (labels.ids[k] != 0)));
     }
+    let by_class = Pixels::decode(&get(&mut workbench, &format!("/labels/{id}/class/cytoplasm.png")).body);
+    let classes: BTreeSet<&[u8]> = by_class.bytes.chunks_exact(4).filter(|p| p[3] > 0).map(|p| &p[..3]).collect();
+    let legend = json_of(&get(&mut workbench, &format!("/legend/{id}/class/cytoplasm")));
+    let known: Vec<&str> = legend.as_array().unwrap().iter().map(|entry| entry["colour"].as_str().unwrap()).collect();
+    let css = |p: &[u8]| format!("#{:02x}{:02x}{:02x}", p[0], p[1], p[2]);
+    assert!(!classes.is_empty() && classes.iter().all(|colour| known.contains(&css(colour).as_str())), "{legend}");
+    assert_eq!(
+        json_of(&get(&mut workbench, &format!("/legend/{id}/detectability/debris"))).as_array().unwrap().len(),
+        2
+    );
     let object = truth.objects.iter().find(|object| object.visible.area() > 0).unwrap();
     let run = object.visible.runs()[0];
     let here = json_of(&get(&mut workbench, &format!("/at/{id}/{}/{}", run.x0, run.y)));
@@ -210,8 +221,11 @@ fn the_page_and_unknown_requests() {
         ("GET", "/render", 405),
         ("GET", "/at/1/2/3", 404),
         ("GET", "/at/x/2/3", 400),
-        ("GET", "/labels/1/nuclei.png", 404),
-        ("GET", "/labels/1/nucleus.png", 404),
+        ("GET", "/labels/1/object/nuclei.png", 404),
+        ("GET", "/labels/1/object/nucleus.png", 404),
+        ("GET", "/labels/1/size/nucleus.png", 404),
+        ("GET", "/legend/1/class/nucleus", 404),
+        ("POST", "/legend/1/class", 405),
         ("GET", "/image.png/7", 404),
         ("POST", "/render", 415),
         ("POST", "/check", 415),

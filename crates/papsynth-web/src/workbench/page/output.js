@@ -70,6 +70,7 @@ function keepNow() {
   if (focus !== null) words.set("f", focus);
   const on = [...layers].filter(([, layer]) => layer.on).map(([name]) => name);
   if (on.length) words.set("l", on.join(","));
+  if (element("by").value !== "object") words.set("c", element("by").value);
   if (element("noise-free").checked) words.set("n", "1");
   words.set("v", [view.x.toFixed(1), view.y.toFixed(1), Number(view.zoom.toPrecision(5))].join(","));
   history.replaceState(null, "", `#${words}`);
@@ -91,6 +92,7 @@ function usePlace() {
   const number = Number.parseFloat(words.get("f"));
   focus = Number.isFinite(number) ? clamp(number, -200, 200) : null;
   element("noise-free").checked = words.get("n") === "1";
+  element("by").value = ["class", "detectability"].includes(words.get("c")) ? words.get("c") : "object";
   const on = words.get("l")?.split(",") ?? [];
   for (const [name, layer] of layers) {
     layer.on = on.includes(name);

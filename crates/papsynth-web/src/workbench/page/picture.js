@@ -162,6 +162,7 @@ function addLayer(name) {
 function setLayer(name, on) {
   Object.assign(layers.get(name), { on });
   layers.get(name).check.checked = on;
+  if (!on) showLegend(shown?.head.id, element("by").value).catch(() => {});
   requestLabels(name);
   redraw();
   keepPlace();
@@ -173,14 +174,41 @@ async function requestLabels(name) {
   if (!layer.on || !id || shown.head.factor > 1 || layer.id === id) return;
   layer.id = id;
   try {
-    const bitmap = await createImageBitmap(await (await request(`labels/${id}/${name}.png`)).blob());
+    const by = element("by").value;
+    const bitmap = await createImageBitmap(await (await request(`labels/${id}/${by}/${name}.png`)).blob());
     if (layer.id !== id) return;
     Object.assign(layer, { bitmap, of: id });
     redraw();
+    showLegend(id, by);
   } catch (error) {
     // Another image has replaced this one.
     if (error.status !== 404) say(error.message);
   }
+}
+
+/** Colours all outlines again. */
+function recolour() {
+  element("legend").replaceChildren();
+  for (const [name, layer] of layers) {
+    Object.assign(layer, { id: 0, of: 0 });
+    requestLabels(name);
+  }
+  redraw();
+  keepPlace();
+}
+
+/** Shows the meaning of the colours. */
+async function showLegend(id, by) {
+  if (by === "object") return;
+  const names = [...layers].filter(([, { on }]) => on).map(([name]) => name);
+  const found = await Promise.all(names.map(async (name) => (await request(`legend/${id}/${by}/${name}`)).json()));
+  if (by !== element("by").value) return;
+  const entries = new Map(found.flat().map(({ colour, text }) => [text, colour]));
+  element("legend").replaceChildren(...[...entries].map(([text, colour]) => {
+    const sample = made("i", []);
+    sample.style.background = colour;
+    return made("li", [sample, text]);
+  }));
 }
 
 // Drawing

@@ -183,6 +183,7 @@ element("redo").addEventListener("click", redo);
 element("reset-all").addEventListener("click", () => setRecipe(state.base));
 element("search").addEventListener("input", showForm);
 element("only-changed").addEventListener("change", showForm);
+element("by").addEventListener("change", recolour);
 element("focus").addEventListener("input", ({ target }) => setFocus(Number(target.value)));
 element("focus-reset").addEventListener("click", () => setFocus(null));
 element("noise-free").addEventListener("change", () => { render("noise-free"); keepPlace(); });
