@@ -2,10 +2,11 @@
 
     nucleus_net.py --train SET [SET ...] --test FOLDER --out RESULT.json [--mask IMAGE MASK] [--steps N] [--seed N] [--weights FILE]
 
-A SET is a data set of `papsynth generate`, of which the masks of nuclei are learned, or a folder of PNG and CSV files with the centres of
-nuclei (y, x), of which discs are learned. SET:N uses its first N fields. Half of each batch comes from each SET. FOLDER holds real fields with
-centres and frames.csv with their grades. A nucleus is found if a detection lies within 12 pixels (4 µm). Writes the numbers of found, detected
-and annotated nuclei of every field, and the Dice coefficient of a mask at several scales, as JSON.
+A SET is a data set of `papsynth generate`, or a folder of data sets, of which the masks of nuclei are learned, or a folder of PNG and CSV files with
+the centres of nuclei (y, x), of which discs are learned. SET:N uses its first N fields. Each batch has equally many crops of all SETs. In data sets,
+a part of the crops show objects that look like nuclei, and their pixels count as much as those of nuclei. FOLDER holds real fields with centres and
+frames.csv with their grades. A nucleus is found if a detection lies within 12 pixels (4 µm). Writes the numbers of found, detected and annotated
+nuclei of every field, and the Dice coefficient of a mask at several scales, as JSON.
 """
 
 import argparse
@@ -30,6 +31,9 @@ SMALLEST = 60  # area of a detection, pixels
 SCALES = (1.0, 0.94)  # of the image with a mask, whose pixel size is not known exactly
 CHANNELS = 12  # of the first level of the network
 CONTRAST = 4.0  # factor on the images
+MIMICS = (4, 5)  # first and last semantic class of objects that look like nuclei: shreds and leukocytes
+MIMIC_CROPS = 0.35  # share of the crops that are chosen to show such objects
+NUCLEUS_WEIGHT = 3.0  # of pixels of nuclei, and of objects that look like them
 
 
 def normalized(image):
@@ -57,35 +61,44 @@ def discs(shape, places):
 
 
 def load(name):
-    """Return the fields of a set: pairs of an image and a mask of nuclei, separated where nuclei touch."""
+    """Return the fields of a set: image, mask of nuclei separated where they touch, mask of objects that look like nuclei."""
     path, _, count = name.partition(":")
     folder, count = Path(path), int(count) if count else None
-    if not (folder / "images").is_dir():
+    sets = [folder] if (folder / "images").is_dir() else sorted(file.parent for file in folder.glob("*/images"))
+    if not sets:
         files = sorted(folder.glob("*.png"))[:count]
         images = [normalized(Image.open(file)) for file in files]
-        return [(image, discs(image.shape, centres(file.with_suffix(".csv")))) for image, file in zip(images, files)]
+        masks = [discs(image.shape, centres(file.with_suffix(".csv"))) for image, file in zip(images, files)]
+        return [(image, mask, np.zeros_like(mask)) for image, mask in zip(images, masks)]
     fields = []
-    for file in sorted((folder / "images").glob("*.png"))[:count]:
-        labels = np.asarray(Image.open(folder / "labels" / "nucleus" / f"{file.stem}.tif"))
+    for file in sorted(file for one in sets for file in (one / "images").glob("*.png"))[:count]:
+        labels, classes = (
+            np.asarray(Image.open(next((file.parent.parent / "labels" / part).glob(f"{file.stem}.*"))))
+            for part in ("nucleus", "semantic")
+        )
         border = np.zeros(labels.shape, bool)
         for axis in (0, 1):
             pair = [np.take(labels, range(s, labels.shape[axis] - 1 + s), axis) for s in (0, 1)]
             touching = (pair[0] != pair[1]) & (pair[0] > 0) & (pair[1] > 0)
             border |= np.pad(touching, [(1, 0) if a == axis else (0, 0) for a in (0, 1)])
-        fields.append((normalized(Image.open(file)), ((labels > 0) & ~border).astype(np.float32)))
+        nuclei, mimics = (labels > 0) & ~border, (classes >= MIMICS[0]) & (classes <= MIMICS[1])
+        fields.append((normalized(Image.open(file)), nuclei.astype(np.float32), mimics.astype(np.float32)))
     return fields
 
 
 def network():
-    """Return the U-Net: four levels, 12 to 192 channels, one output."""
+    """Return the U-Net: five levels from half of the resolution, 12 to 192 channels, one output per pixel."""
     layers = tf.keras.layers
 
-    def block(x, channels):
-        for _ in range(2):
-            x = layers.ReLU()(layers.BatchNormalization()(layers.Conv2D(channels, 3, padding="same", use_bias=False)(x)))
-        return x
+    def convolve(x, channels, size, stride=1):
+        x = layers.Conv2D(channels, size, strides=stride, padding="same", use_bias=False)(x)
+        return layers.ReLU()(layers.BatchNormalization()(x))
 
-    start = x = layers.Input((None, None, 1))
+    def block(x, channels):
+        return convolve(convolve(x, channels, 3), channels, 3)
+
+    start = layers.Input((None, None, 1))
+    x = convolve(start, CHANNELS, 4, stride=2)
     skipped = []
     for level in range(4):
         x = block(x, CHANNELS * 2**level)
@@ -95,23 +108,26 @@ def network():
     for level in reversed(range(4)):
         x = layers.Conv2D(CHANNELS * 2**level, 3, padding="same")(layers.UpSampling2D()(x))
         x = block(layers.Concatenate()([x, skipped[level]]), CHANNELS * 2**level)
-    return tf.keras.Model(start, layers.Conv2D(1, 1)(x))
+    x = layers.Conv2D(4, 1, dtype="float32")(x)
+    return tf.keras.Model(start, layers.Lambda(lambda x: tf.nn.depth_to_space(x, 2), dtype="float32")(x))
 
 
 def crop(fields, rng):
-    """Return a random crop, most with a nucleus, turned, mirrored, and with other light, blur and noise."""
-    image, mask = fields[rng.integers(len(fields))]
+    """Return a random crop, most with a nucleus or an object that looks like one, turned, mirrored, with other light, blur and noise."""
+    field = fields[rng.integers(len(fields))]
+    shown = field[2 if rng.random() < MIMIC_CROPS else 1]
     for _ in range(12):
-        top, left = (rng.integers(0, size - SIDE + 1) for size in image.shape)
+        top, left = (rng.integers(0, size - SIDE + 1) for size in shown.shape)
         part = np.s_[top : top + SIDE, left : left + SIDE]
-        if mask[part].sum() > 150 or rng.random() < 0.2:
+        if shown[part].sum() > 150 or rng.random() < 0.2:
             break
     turns, mirrored = rng.integers(4), rng.random() < 0.5
-    grey, target = (np.rot90(values[part][::-1] if mirrored else values[part], turns) for values in (image, mask))
+    grey, nuclei, mimics = (np.rot90(values[part][::-1] if mirrored else values[part], turns) for values in field)
     grey = grey * rng.uniform(0.8, 1.25) + rng.uniform(-0.03, 0.03)
     if rng.random() < 0.5:
         grey = ndimage.gaussian_filter(grey, rng.uniform(0.3, 1.2))
-    return grey + rng.normal(0, rng.uniform(0, 0.02), grey.shape), target
+    weight = np.where((nuclei > 0) | (mimics > 0), NUCLEUS_WEIGHT, 1)
+    return grey + rng.normal(0, rng.uniform(0, 0.02), grey.shape), nuclei, weight
 
 
 def train(sets, steps, seed):
@@ -122,28 +138,29 @@ def train(sets, steps, seed):
     optimizer = tf.keras.optimizers.Adam(tf.keras.optimizers.schedules.CosineDecay(2e-3, steps))
 
     @tf.function
-    def step(images, targets):
+    def step(images, targets, weights):
         with tf.GradientTape() as tape:
             logits = net(images, training=True)
             found = tf.sigmoid(logits)
-            entropy = tf.reduce_mean(tf.nn.weighted_cross_entropy_with_logits(targets, logits, 3.0))
+            entropy = tf.reduce_mean(weights * tf.nn.sigmoid_cross_entropy_with_logits(targets, logits))
             overlap = (2 * tf.reduce_sum(found * targets) + 1) / (tf.reduce_sum(found) + tf.reduce_sum(targets) + 1)
             loss = entropy + 1 - overlap
         optimizer.apply_gradients(zip(tape.gradient(loss, net.trainable_variables), net.trainable_variables))
         return loss
 
+    losses = []
     for number in range(steps):
-        pairs = [crop(sets[k % len(sets)], rng) for k in range(BATCH)]
-        images, targets = (np.array(values, np.float32)[..., None] for values in zip(*pairs))
-        loss = float(step(images * CONTRAST, targets))
+        crops = [crop(sets[k % len(sets)], rng) for k in range(BATCH)]
+        images, targets, weights = (np.array(values, np.float32)[..., None] for values in zip(*crops))
+        losses.append(float(step(images * CONTRAST, targets, weights)))
         if number % 100 == 99:
-            print(f"step {number + 1} of {steps}, loss {loss:.3f}", flush=True)
+            print(f"step {number + 1} of {steps}, loss {np.mean(losses[-100:]):.3f}", flush=True)
     return net
 
 
 def probability(net, image):
     """Return the probability of nucleus of every pixel."""
-    margin = [(0, -size % 16) for size in image.shape]
+    margin = [(0, -size % 32) for size in image.shape]
     padded = np.pad(image, margin, mode="reflect")[None, ..., None].astype(np.float32) * CONTRAST
     return tf.sigmoid(net(padded, training=False)).numpy()[0, : image.shape[0], : image.shape[1], 0]
 
@@ -189,7 +206,7 @@ def main():
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
     sets = [load(name) for name in options.train]
-    if not all(sets) or any(min(image.shape) < SIDE for fields in sets for image, _ in fields):
+    if not all(sets) or any(min(image.shape) < SIDE for fields in sets for image, *_ in fields):
         parser.error(f"each training set needs at least one field, of at least {SIDE} pixels")
     net = train(sets, options.steps, options.seed)
     result = {"train": options.train, "steps": options.steps, "seed": options.seed, "fields": []}

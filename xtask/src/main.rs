@@ -152,12 +152,14 @@ enum DevCommand {
     /// Builds the Python package, installs it to a new environment, and compares its output with that of the command
     /// line
     ///
-    /// Writes the wheel to target/wheels.
+    /// Writes the wheel to target/wheels. Also tests Jupyter's pictures and tables, and the napari plugin without a
+    /// screen. napari and Qt need 1 GB in target/python; Qt's libraries are installed as root on Debian.
     Python,
     /// Trains every network of crates/papsynth-python/examples for a few steps
     ///
-    /// U-Nets, SegFormer, Mask R-CNN, Cellpose and StarDist start from random weights on small fields; the loss must
-    /// fall. No weights are downloaded. The packages need 9 GB in target/python.
+    /// U-Nets, SegFormer, LR-ASPP, Mask R-CNN, Cellpose and StarDist start from random weights on small fields, one of
+    /// them on a data set of Hugging Face `datasets`; the loss must fall. No weights are downloaded. The packages need
+    /// 9 GB in target/python.
     Training,
     /// Generates a data set with Ray, Dask and Slurm and in an object store, while workers, drivers and daemons are
     /// killed

@@ -12,7 +12,12 @@ use crate::workspace::Workspace;
 
 const BUILDER: &str = "maturin>=1.9,<2\nziglang\n";
 
-const TESTERS: &str = "numpy\npillow\npytest\nscipy\nscikit-learn\n";
+const TESTERS: &str = "numpy\npillow\npytest\nscipy\nscikit-learn\nipython\n";
+
+const NAPARI: &str = "napari[pyqt6]>=0.6\nmagicgui>=0.9\nnumpy\npytest\n";
+
+/// Debian packages of the libraries that Qt loads.
+const QT_LIBRARIES: [&str; 6] = ["libegl1", "libgl1", "libglib2.0-0", "libfontconfig1", "libxkbcommon0", "libdbus-1-3"];
 
 const ENGINES: &str = "numpy\nray\ndask[distributed]\nboto3\nmoto[server]\n";
 
@@ -21,8 +26,8 @@ const ENGINES: &str = "numpy\nray\ndask[distributed]\nboto3\nmoto[server]\n";
 const TRAINERS: [(&str, &str, &str); 2] = [
     (
         "training-torch",
-        "torch\ntorchvision\nmonai\ntransformers\naccelerate\ncellpose>=3.1,<4\nnumpy\npytest\n",
-        "unet,monai,segformer,mask_rcnn,cellpose",
+        "torch\ntorchvision\nmonai\ntransformers\naccelerate\ndatasets\ncellpose>=3.1,<4\nnumpy\npytest\n",
+        "unet,monai,segformer,mask_rcnn,torchvision,monai_crops,datasets,cellpose",
     ),
     (
         "training-stardist",
@@ -43,7 +48,8 @@ const PACKAGE: &str = "crates/papsynth-python";
 
 pub(crate) fn run(workspace: &Workspace) -> Result<()> {
     let wheel = wheel(workspace, "wheels", &[])?;
-    test(workspace, &wheel, &program(workspace)?)
+    test(workspace, &wheel, &program(workspace)?)?;
+    napari(workspace, &wheel)
 }
 
 pub(crate) fn releases(workspace: &Workspace) -> Result<()> {
@@ -66,12 +72,25 @@ pub(crate) fn releases(workspace: &Workspace) -> Result<()> {
 
 /// Runs the tests of the package with an installed wheel and the command line program.
 fn test(workspace: &Workspace, wheel: &Path, program: &Path) -> Result<()> {
-    let tests =
-        ["test_package.py", "test_examples.py"].map(|name| workspace.root.join(PACKAGE).join("tests").join(name));
+    let tests = ["test_package.py", "test_display.py", "test_examples.py"];
+    let tests = tests.map(|name| workspace.root.join(PACKAGE).join("tests").join(name));
     let mut pytest = Command::new(installed(workspace, "package", TESTERS, wheel)?);
     pytest.args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]).args(tests);
     // Outside the source folder, so that the installed package is imported.
     shell::run(pytest.env("PAPSYNTH", program).env("PYTHONDONTWRITEBYTECODE", "1").current_dir(&workspace.target))
+}
+
+/// Runs the tests of the napari plugin without a screen.
+fn napari(workspace: &Workspace, wheel: &Path) -> Result<()> {
+    let python = installed(workspace, "napari", NAPARI, wheel)?;
+    let loads = || shell::succeeds(Command::new(&python).args(["-c", "import PyQt6.QtWidgets"])).then_some(());
+    shell::find_or_install(loads, &QT_LIBRARIES)
+        .ok_or_else(|| skipped("the libraries of Qt are not installed and cannot be installed"))?;
+    let test = workspace.root.join(PACKAGE).join("tests/test_napari.py");
+    let mut pytest = Command::new(python);
+    pytest.args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider", "--disable-warnings"]).arg(test);
+    pytest.envs([("QT_QPA_PLATFORM", "offscreen"), ("PYTHONDONTWRITEBYTECODE", "1")]);
+    shell::run(pytest.current_dir(&workspace.target))
 }
 
 /// Runs every training script for a few steps. Both environments are tried, also if the first cannot be installed.
@@ -92,6 +111,8 @@ pub(crate) fn training(workspace: &Workspace) -> Result<()> {
         pytest.args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]).arg(&test);
         // With more threads, PyTorch competes with the processes that generate fields.
         pytest.envs([("PAPSYNTH_TRAINERS", scripts), ("OMP_NUM_THREADS", "1"), ("HF_HUB_OFFLINE", "1")]);
+        // Data sets of the tests are kept out of the user's cache.
+        pytest.env("HF_HOME", workspace.target.join("python/huggingface"));
         shell::run(pytest.env("PYTHONDONTWRITEBYTECODE", "1").current_dir(&workspace.target))?;
     }
     missing

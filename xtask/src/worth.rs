@@ -16,7 +16,7 @@ const PACKAGES: &str = "numpy\npillow\nscipy\n\
     tensorflow; sys_platform != 'linux' or platform_machine != 'x86_64'\n";
 
 /// Number of fields generated for each grade.
-const FRAMES: &str = "8";
+const FRAMES: &str = "32";
 
 /// Presets of the overlapping cells on which networks are trained: name and number of fields.
 const OVERLAP_TRAINING: [(&str, &str); 2] = [("lbc", "300"), ("dense", "80")];
@@ -158,7 +158,7 @@ fn overlap(workspace: &Workspace, options: &Worth) -> Result<()> {
     Ok(())
 }
 
-/// Returns a folder with synthetic fields of all grades, matched to a half of the real ones.
+/// Returns a folder with a data set of synthetic fields for each grade, matched to a half of the real ones.
 fn synthetic(workspace: &Workspace, folder: &Path, real: &Path, half: usize, widen: &str) -> Result<PathBuf> {
     let out = folder.join(format!("synthetic-{half}-{widen}"));
     if out.exists() {
@@ -166,26 +166,20 @@ fn synthetic(workspace: &Workspace, folder: &Path, real: &Path, half: usize, wid
     }
     let partial = folder.join("partial");
     shell::remove(&partial)?;
-    for (grade, _, preset) in GRADES {
+    shell::make(&partial)?;
+    for (number, (grade, _, preset)) in GRADES.into_iter().enumerate() {
         let recipe = folder.join(format!("matched-{grade}-{half}.toml"));
         if !recipe.exists() {
             let mut fit = program(workspace);
             fit.args(["match", "--pixel-um", PIXEL_UM, "--group", grade, "--preset", preset, "--out"]);
             shell::run(fit.arg(&recipe).arg(real))?;
         }
-        let words = ["--frames", FRAMES, "--widen", widen, "--set", "slide.fields_per_slide=1"].map(PathBuf::from);
-        let fields = partial.join(grade);
-        dataset::generate(program(workspace), &fields, [recipe].into_iter().chain(words))?;
-        for part in ["images", "labels/nucleus"] {
-            shell::make(&partial.join("all").join(part))?;
-            for entry in std::fs::read_dir(fields.join(part)).with_context(|| format!("the fields of {grade}"))? {
-                let file = entry?.path();
-                let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                shell::copy(&file, &partial.join("all").join(part).join(format!("{grade}{name}")))?;
-            }
-        }
+        // With one seed for all, the grades would have the same scenes.
+        let seed = (GRADES.len() * half + number).to_string();
+        let words = ["--frames", FRAMES, "--seed", &seed, "--widen", widen, "--set", "slide.fields_per_slide=1"];
+        let words = words.into_iter().chain(["--without", "noise-free,layers,contact-sheet"]).map(PathBuf::from);
+        dataset::generate(program(workspace), &partial.join(grade), [recipe].into_iter().chain(words))?;
     }
-    std::fs::rename(partial.join("all"), &out).with_context(|| format!("cannot write {}", out.display()))?;
-    shell::remove(&partial)?;
+    std::fs::rename(&partial, &out).with_context(|| format!("cannot write {}", out.display()))?;
     Ok(out)
 }

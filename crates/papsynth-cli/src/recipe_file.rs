@@ -64,9 +64,13 @@ impl RecipeFile {
             let (found, (_, text)) = read(path, "sections of a recipe")?;
             let sections: Table = toml::from_str(&text).unwrap_or_default();
             base.replace(&found, |section| sections.contains_key(section));
+            if !sections.contains_key("conditions") {
+                base.clear_conditions(|path| path.split('.').next().is_some_and(|name| sections.contains_key(name)));
+            }
         }
         if let Some(camera) = args.camera {
             base.camera = camera.camera();
+            base.clear_conditions(|path| path.starts_with("camera."));
         }
         if let Some(factor) = args.widen {
             base = base.widened(factor);
@@ -151,7 +155,13 @@ impl Sources {
         }
         let text = toml::to_string(&table).map_err(|e| fault(e.to_string()))?;
         // The user does not see this text, so only the paths of the fields are kept.
-        diagnose::read(&text).map_err(|faults| faults.into_iter().map(|f| FieldError { span: None, ..f }).collect())
+        let mut recipe = diagnose::read(&text)
+            .map_err(|faults| faults.into_iter().map(|f| FieldError { span: None, ..f }).collect::<Vec<_>>())?;
+        recipe.clear_conditions(|path| {
+            let path: Vec<String> = path.split('.').map(str::to_owned).collect();
+            self.sets.iter().any(|set| set.replaces(&path))
+        });
+        Ok(recipe)
     }
 
     /// Errors with their locations: the last `--set` of the field, or the file.
@@ -217,6 +227,12 @@ impl Set {
     /// Whether one of the two paths contains the other.
     fn touches(&self, path: &[String]) -> bool {
         self.path.iter().zip(path).all(|(a, b)| a == b)
+    }
+
+    /// Whether the number at a path has another value or meaning now: another kind changes all numbers of its table.
+    fn replaces(&self, path: &[String]) -> bool {
+        let changed = self.path.strip_suffix(&["kind".to_owned()]).unwrap_or(&self.path);
+        changed.iter().zip(path).all(|(a, b)| a == b)
     }
 }
 
@@ -298,6 +314,19 @@ mod tests {
         // A bound is added to the distribution.
         let recipe = load(Preset::Lbc, &["slide.depth_um={uniform=[2, 6]}", "slide.depth_um.max=5"]).unwrap();
         assert_eq!(recipe.slide.depth_um.bounds(), [2.0, 5.0]);
+    }
+
+    #[test]
+    fn a_set_holds_under_all_conditions() {
+        let conditions = "conditions=[{ numbers = { 'stain.field_nucleus' = 2, 'layout.radius_um' = 30, \
+            'debris.leukocytes.clusters' = { per_mm2 = 5 } } }]";
+        let sets = [conditions, "debris.leukocytes.clusters.per_mm2.uniform=[10, 20]", "layout.kind=uniform"];
+        let recipe = load(Preset::ExtendedFocus, &sets).unwrap();
+        assert_eq!(recipe.conditions[0].numbers.keys().collect::<Vec<_>>(), ["stain.field_nucleus"]);
+        assert_eq!(
+            recipe.with_condition(0).debris.leukocytes.clusters.to_string(),
+            "{ per_mm2 = { uniform = [10.0, 20.0] } }"
+        );
     }
 
     #[test]

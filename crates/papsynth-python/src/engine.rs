@@ -187,6 +187,12 @@ impl Engine {
         self.engine.recipe().to_toml()
     }
 
+    /// Return the HTML that Jupyter shows: the preset that is closest to the recipe, and the fields that differ.
+    fn _repr_html_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let display = py.import("papsynth._display")?;
+        display.call_method1("engine_html", (self.recipe(),))
+    }
+
     fn __repr__(&self) -> String {
         format!("<papsynth.Engine of {}>", self.source)
     }
@@ -294,6 +300,12 @@ fn read(path: &Path, largest: u64) -> PyResult<String> {
 #[pyfunction]
 pub(crate) fn recipe_schema() -> String {
     Recipe::schema().to_string()
+}
+
+/// Returns names and summaries of the presets.
+#[pyfunction]
+pub(crate) fn presets() -> Vec<(&'static str, &'static str)> {
+    Preset::ALL.into_iter().map(|preset| (preset.name(), preset.summary())).collect()
 }
 
 /// Returns a complete recipe as TOML.

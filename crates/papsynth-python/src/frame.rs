@@ -309,6 +309,12 @@ impl Frame {
         written.map_err(|error| error::dataset(&error))
     }
 
+    /// Return the PNG that Jupyter shows: `image`, reduced to at most 768 pixels a side, with outlines of the visible
+    /// cells and nuclei.
+    fn _repr_png_<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        this.py().import("papsynth._display")?.call_method1("frame_png", (this,))
+    }
+
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Pickled)> {
         let Truth { width, height, .. } = self.truth;
         let arrays = [&self.image, &self.stack, &self.noise_free].map(|array| array.clone_ref(py));

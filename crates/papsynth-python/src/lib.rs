@@ -34,7 +34,7 @@ mod _native {
     #[pymodule_export]
     use crate::{
         calibrate::{calibrate_camera, calibrate_microscope},
-        engine::{Engine, identity, recipe_schema, resolve},
+        engine::{Engine, identity, presets, recipe_schema, resolve},
         frame::{Frame, restored},
         learn::{judge, learn},
         matching::match_fields,

@@ -306,6 +306,23 @@ def test_recipes_are_completed_and_have_a_schema():
     assert json.dumps(papsynth.schema())
 
 
+def test_without_a_parser_of_toml_all_but_recipes_works():
+    script = """
+import sys
+sys.modules["tomllib"] = sys.modules["tomli"] = None
+import papsynth
+assert papsynth.render({"field": {"width_px": 64, "height_px": 64}})._repr_png_()
+assert papsynth.Engine()._repr_html_() is None
+try:
+    papsynth.recipe()
+except ModuleNotFoundError as error:
+    assert "tomli" in str(error)
+else:
+    raise AssertionError("no error")
+"""
+    subprocess.run([sys.executable, "-c", script], check=True)
+
+
 def test_a_recipe_is_widened_for_training():
     wide = papsynth.recipe(SMALL, widen=2.0)
     assert papsynth.recipe(SMALL, widen=1.0) == papsynth.recipe(SMALL)

@@ -16,7 +16,17 @@ import pytest
 PACKAGE = Path(__file__).parent.parent
 sys.path.insert(0, str(PACKAGE / "examples"))
 
-STEPS = {"unet": 30, "monai": 30, "segformer": 30, "mask_rcnn": 12, "cellpose": 40, "stardist": 40}
+STEPS = {
+    "unet": 30,
+    "monai": 30,
+    "segformer": 30,
+    "mask_rcnn": 12,
+    "torchvision": 30,
+    "monai_crops": 30,
+    "datasets": 30,
+    "cellpose": 40,
+    "stardist": 40,
+}
 INSTALLED = [name for name in os.environ.get("PAPSYNTH_TRAINERS", "").split(",") if name]
 
 
@@ -82,3 +92,18 @@ def test_a_data_loader_gives_the_same_samples_with_any_number_of_workers():
     fields = papsynth.Dataset({"field": {"width_px": 128, "height_px": 128}}, length=6, transform=sample)
     for one, other in zip(DataLoader(fields, 2), DataLoader(fields, 2, num_workers=2)):
         assert all(np.array_equal(a, b) for a, b in zip(one, other))
+
+
+@pytest.mark.skipif("datasets" not in INSTALLED, reason="datasets is not installed")
+def test_a_data_set_of_hugging_face_has_the_fields_of_its_recipe():
+    from train_datasets import data_set
+
+    recipe = papsynth.recipe({"field": {"width_px": 64, "height_px": 64}})
+    rows = data_set(recipe, 3, workers=2)
+    for index, row in enumerate(rows):
+        frame = papsynth.render(recipe, seed=1, index=index)
+        assert (row["index"], row["slide"]) == (index, frame.slide)
+        assert np.array_equal(np.asarray(row["image"]), frame.image)
+    assert data_set(recipe, 3, workers=2).cache_files == rows.cache_files
+    other = data_set({**recipe, "camera": {**recipe["camera"], "prnu": 0.01}}, 3, workers=2)
+    assert other.cache_files != rows.cache_files

@@ -85,6 +85,15 @@ class Section:
 '''
 
 
+TAIL = '''
+    def _repr_html_(self) -> str | None:
+        """Return the HTML that Jupyter shows: the fields that differ from the closest preset, or the errors."""
+        from ._display import given_html
+
+        return given_html(self.to_dict())
+'''
+
+
 def name_of(reference):
     return reference.rsplit("/", 1)[1]
 
@@ -165,6 +174,7 @@ def text(schema):
     for name in sorted(schema["$defs"]):
         writer.definition(name)
     writer.section("Recipe", schema, schema.get("description"))
+    writer.text[-1] += TAIL
     # Aliases refer to classes, so they follow them.
     aliases = [part for part in writer.text if not part.startswith("\n@dataclass")]
     classes = [part for part in writer.text if part.startswith("\n@dataclass")]

@@ -14,9 +14,11 @@ from __future__ import annotations
 from . import cloth, cytoskeleton, dyes, fields, fsd, noise, optics, texture
 from ._calibrate import calibrate_camera, calibrate_microscope
 from ._dataset import Dataset, IterableDataset
+from ._display import RecipeDict as _RecipeDict
 from ._errors import FieldError, RecipeError
 from ._learn import judge, learn, match
 from ._native import IGNORED, MIMICS, MIN_DETECTABILITY, SEMANTIC_CLASSES, Engine, Frame
+from ._native import presets as _presets
 from ._native import recipe_schema as _recipe_schema
 from ._native import resolve as _resolve
 from ._render import render
@@ -50,6 +52,7 @@ __all__ = [
     "missing",
     "noise",
     "optics",
+    "presets",
     "recipe",
     "render",
     "schema",
@@ -73,7 +76,7 @@ def recipe(recipe=None, *, widen: float = 1.0) -> dict:
     Returns
     -------
     dict
-        Sections with their fields, as in TOML.
+        Sections with their fields, as in TOML. Jupyter shows the fields that differ from the closest preset.
 
     Raises
     ------
@@ -84,7 +87,12 @@ def recipe(recipe=None, *, widen: float = 1.0) -> dict:
     """
     from ._toml import loads
 
-    return loads(_resolve(recipe, widen))
+    return _RecipeDict(loads(_resolve(recipe, widen)))
+
+
+def presets() -> dict[str, str]:
+    """Return the names of the presets with their summaries; the first is the default."""
+    return dict(_presets())
 
 
 def schema() -> dict:

@@ -214,8 +214,8 @@ class CameraSection(Section):
     """Dark signal non-uniformity: standard deviation of the pixels' offsets. From 0 to 100000 electrons."""
 
     sensor_dust: Number | None = None
-    """Number of specks of dust on or in front of the sensor per million pixels of the image. All images have the same
-    specks. From 0 to 10000.
+    """Number of specks of dust on or in front of the sensor per million pixels of the image. All images of the same size
+    have the same specks. From 0 to 10000.
     """
 
     serial: int | None = None
@@ -454,13 +454,19 @@ class Cytoplasm(Section):
     """Number of protrusions of the rim. From 0 to 20."""
 
     wrinkles: Number | None = None
-    """Number of wrinkles: narrow folds of double thickness. From 0 to 100."""
+    """Number of wrinkles: narrow folds of double thickness. A third of them are rolled stretches of the rim. From 0 to
+    100.
+    """
 
     wrinkle_thickness: Number | None = None
-    """Additional thickness at the crest of a wrinkle, relative to the flat sheet. From 0 to 5."""
+    """Additional thickness at the crest of a wrinkle, relative to the flat sheet. Rolled stretches of the rim have 0.8 to
+    3 times this thickness. From 0 to 5.
+    """
 
     wrinkle_um: Number | None = None
-    """Width of a wrinkle: standard deviation of its profile. From 0.05 to 5 µm."""
+    """Width of a wrinkle: standard deviation of its profile. Rolled stretches of the rim have 0.4 to 0.9 µm. From 0.05 to
+    5 µm.
+    """
 
     endoplasm: Number | None = None
     """Additional density and granularity of the cytoplasm around the nucleus, relative to the rest. From 0 to 2."""
@@ -1536,6 +1542,12 @@ class Recipe(Section):
     """Conditions of slides: numbers that differ together between slides, such as stain and light. One entry is drawn for
     each slide (`slide.fields_per_slide`). Without entries, all slides have the numbers of the recipe.
     """
+
+    def _repr_html_(self) -> str | None:
+        """Return the HTML that Jupyter shows: the fields that differ from the closest preset, or the errors."""
+        from ._display import given_html
+
+        return given_html(self.to_dict())
 
 
 Acceptance = Union[Literal['near'], Literal['threshold']]

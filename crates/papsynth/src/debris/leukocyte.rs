@@ -42,7 +42,7 @@ section! {
         /// Fraction of the lobed leukocytes of a cluster that touch another one.
         touching: Number = 0.7, 0..=1;
         /// Fraction of the clusters that are on a cell, most of them near its rim.
-        on_cells: Number = 0.45, 0..=1;
+        on_cells: Number = 0.3, 0..=1;
         /// Shape of the nucleus.
         form: NucleusForm = NucleusForm::Lobed;
         /// Radius of the nucleus (s of Eq. 7); for a lobed nucleus, radius of a disc of the same area.
@@ -54,19 +54,19 @@ section! {
         /// Lobes of a lobed nucleus.
         lobes: Count = Number::choice([1.0, 1.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 4.0]), 1..=8;
         /// Diameter of the cytoplasm of a lobed leukocyte.
-        cytoplasm_diameter_um: Number = Number::normal(10.2, 1.1).at_least(7.0), 1..=100, "µm";
+        cytoplasm_diameter_um: Number = Number::normal(11.6, 1.5).at_least(7.0), 1..=100, "µm";
         /// Probability that a lobed leukocyte is degenerated, with a smudged or pyknotic nucleus and frayed cytoplasm.
-        degenerated: Number = 0.25, 0..=1;
+        degenerated: Number = 0.35, 0..=1;
         /// Fraction of the degenerated leukocytes whose nucleus is pyknotic: small and dark, without structure.
-        pyknotic: Number = 0.4, 0..=1;
+        pyknotic: Number = 0.2, 0..=1;
         /// Fraction of the lobed leukocytes that are histiocytes, which are larger and have a kidney-shaped nucleus.
         histiocytes: Number = 0.04, 0..=1;
         /// Probability that granular remains stick to a lobed leukocyte. They belong to its mask.
         remains: Number = 0.3, 0..=1;
         /// Absorbance of the nucleus, before the nuclear stain factor of the field.
-        absorbance: Number = Number::normal(0.26, 0.042).at_least(0.1), 0..=4;
+        absorbance: Number = Number::normal(0.29, 0.06).at_least(0.1), 0..=4;
         /// Absorbance of the cytoplasm.
-        cytoplasm_absorbance: Number = Number::log_normal(0.13, 0.4), 0..=4;
+        cytoplasm_absorbance: Number = Number::log_normal(0.13, 0.45), 0..=4;
     }
 }
 

@@ -83,6 +83,13 @@ impl Recipe {
         recipe
     }
 
+    /// Removes numbers from all conditions, so that those of the recipe hold: all whose path is `changed`.
+    pub fn clear_conditions(&mut self, changed: impl Fn(&str) -> bool) {
+        for condition in &mut self.conditions {
+            condition.numbers.retain(|path, _| !changed(path));
+        }
+    }
+
     /// Returns the numbers that differ from those of another recipe, as those of a condition of the other recipe. Other
     /// differences are ignored.
     #[must_use]

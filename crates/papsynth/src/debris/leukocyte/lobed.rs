@@ -4,6 +4,8 @@
 
 use core::f64::consts::{PI, TAU};
 
+use optics_psf::{Border, Gaussian};
+
 use super::{Leukocyte, NucleusForm};
 use crate::debris::prelude::*;
 use crate::debris::tuft::{Tuft, crop};
@@ -72,9 +74,15 @@ const VACUOLE_UM: [f64; 2] = [0.25, 0.45];
 /// Width of the darker border of a cytoplasm, µm.
 const BORDER_UM: f64 = 0.5;
 /// Relative increase of absorbance in the border: minimum, maximum.
-const BORDER: [f64; 2] = [0.0, 0.4];
+const BORDER: [f64; 2] = [0.0, 0.25];
 /// Absorbance at the edge of a rounded cytoplasm relative to its centre: minimum, maximum.
-const FLATNESS: [f64; 2] = [0.1, 0.8];
+const FLATNESS: [f64; 2] = [0.0, 0.5];
+
+/// Softness, µm: standard deviation of the blur of a leukocyte, minimum and maximum. Leukocytes are about as high as
+/// wide, so that most of a leukocyte is out of focus in every plane, and also in fused images.
+const SOFTNESS_UM: [f64; 2] = [0.25, 0.65];
+/// Reach of this blur, in standard deviations.
+const SOFT_REACH: f64 = 3.0;
 
 pub(super) fn make(leukocyte: &Leukocyte, context: &ObjectContext<'_>) -> Phantom {
     let mut rng = context.stream("shape");
@@ -104,7 +112,8 @@ pub(super) fn make(leukocyte: &Leukocyte, context: &ObjectContext<'_>) -> Phanto
 
     let corners = remains.iter().flat_map(Tuft::corners);
     let points: Vec<Point> = outline.iter().chain(shapes.iter().flatten()).copied().chain(corners).collect();
-    let mut canvas = context.canvas(&points, 0.0);
+    let softness_um = random::between(SOFTNESS_UM[0], SOFTNESS_UM[1], &mut rng);
+    let mut canvas = context.canvas(&points, SOFT_REACH * softness_um);
     canvas.coverage.cover(&outline);
     shade_cytoplasm(&mut canvas, &outline, leukocyte, context, &mut rng);
     if let Some(remains) = &remains {
@@ -137,6 +146,11 @@ pub(super) fn make(leukocyte: &Leukocyte, context: &ObjectContext<'_>) -> Phanto
     nucleus.texture(context.noise_fields.clouds(), &sampler, chromatin as f32);
     for (cover, inside) in canvas.coverage.values.iter_mut().zip(&nucleus.coverage.values) {
         *cover = cover.max(*inside);
+    }
+    if let Ok(blur) = Gaussian::new(context.px(softness_um)) {
+        for tile in [&mut canvas.absorbance, &mut nucleus.absorbance] {
+            tile.values = blur.blur(&tile.values, tile.width, Border::Zero);
+        }
     }
     crop(&mut canvas, context, context.px(leukocyte.reach_um(context.pixel_um)));
     let mut phantom = canvas
