@@ -39,6 +39,7 @@ pub(crate) fn run(workspace: &Workspace) -> Result<()> {
     };
     run("browser_study.py", &[&real, &synthetic, &folder.join("study")])?;
     run("browser_view.py", &[&stack, &folder.join("view")])?;
+    run("browser_workbench.py", &[&folder.join("workbench")])?;
     let pages = site::check(workspace)?;
     let script = workspace.root.join("site/tests/browser_site.py");
     shell::run(Command::new(&python).arg(script).arg(chromium).args([&pages, &folder.join("site")]))

@@ -38,7 +38,7 @@ const RULES: [(&[&str], &[&[&str]]); 16] = [
     // Fits with the techniques, finds regions like the reader of label images, and writes sections of recipes.
     (&["papsynth-calibrate"], &[NUMERICS, TECHNIQUES, ENGINE, &["papsynth-dataset"]]),
     // Shows files and a study; the engine defines the groups of objects.
-    (&["papsynth-web"], &[ENGINE, &["papsynth-dataset", "papsynth-study"]]),
+    (&["papsynth-web"], &[ENGINE, &["papsynth-dataset", "papsynth-judge", "papsynth-study"]]),
     // Simulates with the engine and measures with the judge.
     (&["papsynth-match"], &[NUMERICS, ENGINE, &["papsynth-judge", "dye-spectra"]]),
     // Translates errors of the techniques to options of `papsynth calibrate`.

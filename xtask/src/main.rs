@@ -125,7 +125,7 @@ enum DevCommand {
         #[arg(long)]
         full: bool,
     },
-    /// Tests `papsynth study` and `papsynth view` in headless Chromium, with keyboard and mouse
+    /// Tests `papsynth study`, `view` and `workbench` in headless Chromium, with keyboard and mouse
     ///
     /// A short study with a restart of page and program: compares results with the clicks, and checks that all requests
     /// are to loopback and that no response contains an answer. The viewer with a focus stack: compares the canvas with

@@ -96,6 +96,8 @@ fn run(verb: Verb) -> Result<(), ExitError> {
         Verb::Study(args) => web::study(&args),
         #[cfg(feature = "web")]
         Verb::View(args) => web::view(&args),
+        #[cfg(feature = "web")]
+        Verb::Workbench(args) => web::workbench(&args),
         Verb::Schema(_) => {
             let schema = Recipe::schema();
             exit::print(&format!("{schema:#}\n"))
@@ -115,7 +117,7 @@ fn run(verb: Verb) -> Result<(), ExitError> {
         #[cfg(not(feature = "learn"))]
         Verb::Learn(_) => Err(ExitError::missing_feature("learn")),
         #[cfg(not(feature = "web"))]
-        Verb::Study(_) | Verb::View(_) => Err(ExitError::missing_feature("web")),
+        Verb::Study(_) | Verb::View(_) | Verb::Workbench(_) => Err(ExitError::missing_feature("web")),
     }
 }
 

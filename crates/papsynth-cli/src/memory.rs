@@ -53,6 +53,12 @@ impl Limits {
     }
 }
 
+/// Memory that a program may use, bytes: as asked, or a fraction of the available memory; `None` if that is unknown.
+#[cfg(feature = "web")]
+pub(crate) fn limit(asked: Option<u64>) -> Option<u64> {
+    Limits::new(asked).budget(1).map(|budget| budget.bytes)
+}
+
 /// How a run fits into its budget: with at most `workers` frames at the same time. `too_large` is the error for a
 /// budget that is too small for one frame.
 pub(crate) fn fit(

@@ -1,12 +1,16 @@
-//! `papsynth view` and `papsynth study`: pages served on this machine.
+//! `papsynth view`, `papsynth workbench` and `papsynth study`: pages served on this machine.
 
 use std::process::{Command, Stdio};
 
+use papsynth::Inputs;
+use papsynth::recipe::Preset;
 use papsynth_study::{Group, Interval, Pool, Row, Session, Side, State, StudyParams, Summary, breakdown_table, table};
 use papsynth_web::{Error, Server, serve_study};
 
-use crate::args::{Study, View};
+use crate::args::{Study, View, Workbench};
 use crate::exit::{self, ErrorReport, ExitError};
+use crate::setup::Setup;
+use crate::{memory, preview};
 
 /// Opens a page in the default browser.
 fn open(address: &str) {
@@ -38,6 +42,31 @@ pub(crate) fn view(args: &View) -> Result<(), ExitError> {
         open(&address);
     }
     Ok(server.run(view, stop, |_| ())?)
+}
+
+/// `papsynth workbench`: a recipe and its image, in the browser.
+pub(crate) fn workbench(args: &Workbench) -> Result<(), ExitError> {
+    let setup = Setup::load(&args.engine, None)?;
+    preview::check_memory(&setup)?;
+    let threads = setup.threads_of_a_frame();
+    let params = papsynth_web::WorkbenchParams {
+        recipe: setup.recipe.recipe,
+        preset: args.engine.recipe.preset.unwrap_or(Preset::Lbc),
+        model: setup.model,
+        inputs: Inputs { weight_map: setup.engine.weight_map().cloned(), ..Inputs::default() },
+        seed: args.engine.seed,
+        threads,
+        max_memory: memory::limit(args.max_memory),
+    };
+    let workbench = papsynth_web::Workbench::new(params)?;
+    let server = Server::bind(args.port.unwrap_or(0))?;
+    let stop = exit::stop_flag()?;
+    let address = server.address();
+    exit::print(&format!("Open {address} in a browser. Press Ctrl-C to quit.\n"))?;
+    if args.open {
+        open(&address);
+    }
+    Ok(server.run(workbench, stop, |_| ())?)
 }
 
 /// `papsynth study`: a reader study with real and synthetic patches.

@@ -20,6 +20,9 @@ pub enum Error {
     /// A data set or slide cannot be read, or the folder contains neither.
     #[error(transparent)]
     Dataset(Box<papsynth_dataset::Error>),
+    /// The model of a workbench is invalid.
+    #[error(transparent)]
+    Engine(Box<papsynth::Error>),
     /// A study cannot be saved.
     #[error(transparent)]
     Study(Box<papsynth_study::Error>),
@@ -28,6 +31,12 @@ pub enum Error {
 impl From<papsynth_dataset::Error> for Error {
     fn from(error: papsynth_dataset::Error) -> Self {
         Self::Dataset(Box::new(error))
+    }
+}
+
+impl From<papsynth::Error> for Error {
+    fn from(error: papsynth::Error) -> Self {
+        Self::Engine(Box::new(error))
     }
 }
 
@@ -44,7 +53,7 @@ impl Error {
         match self {
             Self::Dataset(error) => error.is_io(),
             Self::Study(error) => error.is_io(),
-            Self::Listen { .. } | Self::Clock => false,
+            Self::Engine(_) | Self::Listen { .. } | Self::Clock => false,
         }
     }
 }

@@ -10,8 +10,13 @@ pub(crate) const CSS: &str = "text/css; charset=utf-8";
 pub(crate) const JS: &str = "text/javascript; charset=utf-8";
 
 /// Files that all pages use.
-const SHARED: [File; 2] =
-    [("/base.css", CSS, include_str!("page/base.css")), ("/base.js", JS, include_str!("page/base.js"))];
+const SHARED: [File; 5] = [
+    ("/base.css", CSS, include_str!("page/base.css")),
+    ("/base.js", JS, include_str!("page/base.js")),
+    ("/canvas.css", CSS, include_str!("page/canvas.css")),
+    ("/canvas.js", JS, include_str!("page/canvas.js")),
+    ("/objects.js", JS, include_str!("page/objects.js")),
+];
 
 /// Returns the static file that a request names, if any.
 pub(crate) fn file(own: &[File], request: &Request) -> Option<Reply> {

@@ -6,10 +6,10 @@ use crate::error::Error;
 use crate::frame::{Finished, Frame, Plane};
 use crate::key::Key;
 use crate::model::Model;
-use crate::phantom::PhantomAssets;
+use crate::phantom::{PhantomAssets, PhantomSettings};
 use crate::profile::{Profile, Stage, StageTimer};
 use crate::recipe::Recipe;
-use crate::render::{FrameBuffers, Rendering, phantoms};
+use crate::render::{FrameBuffers, Rendering, Work, phantoms};
 use crate::scene::{self, Scene, WeightMap};
 use crate::threads::Threads;
 use crate::transmit::MicroscopeCache;
@@ -27,6 +27,7 @@ pub struct Inputs {
 /// Generates images of a recipe and a model.
 #[derive(Debug)]
 pub struct Engine {
+    recipe: Recipe,
     pub(crate) model: Model,
     weight_map: Option<WeightMap>,
     pub(crate) assets: PhantomAssets,
@@ -41,15 +42,12 @@ impl Engine {
     /// # Errors
     /// If the recipe or the model is invalid: the field, its value, and what is accepted.
     pub fn new(recipe: &Recipe, model: &Model, inputs: &Inputs) -> Result<Self, Error> {
-        let problems = recipe.problems();
-        if !problems.is_empty() {
-            return Err(Error::Recipe(problems));
-        }
+        check(recipe, inputs.weight_map.as_ref())?;
         model.check()?;
-        scene::check_layout(&recipe.layout, inputs.weight_map.as_ref()).map_err(Error::Layout)?;
         let timer = StageTimer(inputs.profile.clone());
-        let assets = PhantomAssets::new(recipe, model, timer).map_err(Error::Model)?;
+        let assets = PhantomAssets::new(PhantomSettings::of(recipe), model, timer).map_err(Error::Model)?;
         Ok(Self {
+            recipe: recipe.clone(),
             model: model.clone(),
             weight_map: inputs.weight_map.clone(),
             assets,
@@ -61,7 +59,13 @@ impl Engine {
     /// Returns the recipe.
     #[must_use]
     pub fn recipe(&self) -> &Recipe {
-        &self.assets.recipe
+        &self.recipe
+    }
+
+    /// Returns the weight map of the layout, if the inputs have one.
+    #[must_use]
+    pub fn weight_map(&self) -> Option<&WeightMap> {
+        self.weight_map.as_ref()
     }
 
     /// Draws the objects of a field and how it is imaged.
@@ -115,9 +119,10 @@ impl Engine {
         self.with_buffers(|buffers| {
             let noise_fields = self.assets.noise_fields.fields(scene.key);
             let objects: Vec<_> = scene.objects.iter().collect();
-            let phantoms = phantoms(&self.assets, &noise_fields, &scene, &objects, threads).map_err(fail)?;
+            let work = Work::on(threads);
+            let phantoms = phantoms(&self.assets, &noise_fields, &scene, &objects, &work).map_err(fail)?;
             let mut rendering =
-                Rendering::new(&self.assets, &self.microscopes, scene, phantoms, threads, buffers).map_err(fail)?;
+                Rendering::new(&self.assets, &self.microscopes, scene, phantoms, work, buffers).map_err(fail)?;
             for plane in 0..rendering.planes() {
                 sink(rendering.plane(plane, buffers).map_err(fail)?)?;
             }
@@ -149,4 +154,13 @@ impl Engine {
         })?;
         Ok(Frame { planes, finished })
     }
+}
+
+/// Checks a recipe, and the weight map for its layout.
+pub(crate) fn check(recipe: &Recipe, weight_map: Option<&WeightMap>) -> Result<(), Error> {
+    let problems = recipe.problems();
+    if !problems.is_empty() {
+        return Err(Error::Recipe(problems));
+    }
+    scene::check_layout(&recipe.layout, weight_map).map_err(Error::Layout)
 }

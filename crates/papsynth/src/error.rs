@@ -52,6 +52,9 @@ pub enum ErrorKind {
         /// The largest accepted value.
         high: f64,
     },
+    /// The image was cancelled before it was complete.
+    #[error("cancelled")]
+    Cancelled,
     /// A profile of a model is empty.
     #[error("{0}: expected at least 1 number, found none")]
     EmptyProfile(String),

@@ -14,6 +14,7 @@ mod fuse;
 pub mod key;
 #[cfg(feature = "learn")]
 pub mod learn;
+pub mod live;
 pub mod model;
 mod phantom;
 pub mod profile;

@@ -7,33 +7,79 @@ use crate::detect::{Detector, ExposureBuffers, sum_over};
 use crate::error::ErrorKind;
 use crate::frame::{Finished, Plane};
 use crate::fuse;
+use crate::live::Cancellation;
 use crate::phantom::tile::overlay;
 use crate::phantom::{self, NoiseFields, Phantom, PhantomAssets, Piece};
 use crate::profile::{Stage, StageTimer};
 use crate::recipe::Restore;
 use crate::scene::{Body, Object, Scene, View};
 use crate::threads::{self, Threads};
-use crate::transmit::{FocusAt, LightBuffers, LightPath, MicroscopeCache, RowBand, Specimen};
+use crate::transmit::{FocusAt, LightBuffers, LightPath, MicroscopeCache, RowBand, Specimen, TransmissionStats};
 use crate::truth::{COVERED, Group, Mask, ObjectTruth, Part, Run, Truth, merge_layers, visible_masks_in};
 
 /// Buffers that are reused from image to image, because allocation is slow relative to rendering.
 #[derive(Debug, Default)]
 pub(crate) struct FrameBuffers {
-    light: LightBuffers,
+    pub(crate) light: LightBuffers,
     plane: Plane,
     exposure: ExposureBuffers,
     /// All zeros between images.
     ids: Vec<u32>,
 }
 
+/// The threads that render an image, and the flag that cancels it.
+#[derive(Debug, Clone)]
+pub(crate) struct Work {
+    pub(crate) threads: Threads,
+    pub(crate) cancellation: Cancellation,
+}
+
+impl Work {
+    /// Returns work that is not cancelled.
+    pub(crate) fn on(threads: Threads) -> Self {
+        Self { threads, cancellation: Cancellation::default() }
+    }
+}
+
+/// The parts of a rendering that do not depend on camera, background and plane.
+pub(crate) struct Parts {
+    pub(crate) scene: Scene,
+    /// The phantoms of the objects, with their masks.
+    pub(crate) phantoms: Vec<Phantom>,
+    pub(crate) path: LightPath,
+    /// The feathered mask C′ of nuclei with imaged texture, if these are restored.
+    pub(crate) feathered: Option<Vec<f32>>,
+}
+
+impl Parts {
+    /// Prepares the optics of a scene whose objects have these phantoms.
+    pub(crate) fn new(
+        scene: Scene,
+        phantoms: Vec<Phantom>,
+        microscopes: &MicroscopeCache,
+        work: &Work,
+    ) -> Result<Self, ErrorKind> {
+        let path = LightPath::new(Specimen { scene: &scene, phantoms: &phantoms, work }, microscopes)?;
+        let feathered = feathered(&scene, &phantoms)?;
+        Ok(Self { scene, phantoms, path, feathered })
+    }
+}
+
+/// Computes the masks of phantoms in the image.
+pub(crate) fn add_masks(phantoms: &mut [Phantom], scene: &Scene, threads: Threads) {
+    let (view, n) = (scene.view, scene.oversampling());
+    let mask = |piece: &Piece| mask_of(piece, n, [0; 2], [view.width, view.height]);
+    let masks = threads::map(threads, phantoms, |phantom| phantom.pieces.iter().map(mask).collect::<Vec<_>>());
+    let pieces = phantoms.iter_mut().flat_map(|phantom| &mut phantom.pieces);
+    for (piece, mask) in pieces.zip(masks.into_iter().flatten()) {
+        (piece.mask, piece.covered) = mask;
+    }
+}
+
 /// A scene with its phantoms.
 pub(crate) struct Rendering {
-    scene: Scene,
-    phantoms: Vec<Phantom>,
-    threads: Threads,
-    path: LightPath,
-    /// The feathered mask C′ of nuclei with imaged texture, if these are restored.
-    feathered: Option<Vec<f32>>,
+    parts: Parts,
+    work: Work,
     detector: Detector,
     /// Detectability of each piece, one entry per plane.
     detectability: Vec<Vec<f64>>,
@@ -46,7 +92,7 @@ pub(crate) fn phantoms(
     noise_fields: &NoiseFields,
     scene: &Scene,
     objects: &[&Object],
-    threads: Threads,
+    work: &Work,
 ) -> Result<Vec<Phantom>, ErrorKind> {
     // Cells come first, so that their batches are full.
     let mut order: Vec<usize> = (0..objects.len()).collect();
@@ -54,7 +100,12 @@ pub(crate) fn phantoms(
     let ordered: Vec<&Object> = order.iter().map(|&number| objects[number]).collect();
     let batches: Vec<&[&Object]> = ordered.chunks(phantom::BATCH).collect();
     let mut drawn: Vec<Phantom> = Vec::with_capacity(objects.len());
-    for batch in threads::map(threads, &batches, |batch| phantom::make(assets, scene, noise_fields, batch)) {
+    let of_phantoms = scene.of_phantoms();
+    let make = |batch: &&[&Object]| {
+        work.cancellation.check()?;
+        phantom::make(assets, &of_phantoms, noise_fields, batch)
+    };
+    for batch in threads::map(work.threads, &batches, make) {
         drawn.extend(batch?);
     }
     if scene.frame.is_some() {
@@ -73,41 +124,57 @@ impl Rendering {
         microscopes: &MicroscopeCache,
         scene: Scene,
         mut phantoms: Vec<Phantom>,
-        threads: Threads,
+        work: Work,
         buffers: &mut FrameBuffers,
     ) -> Result<Self, ErrorKind> {
-        let timer = assets.timer.clone();
-        timer.time(Stage::Masks, || {
-            let (view, n) = (scene.view, scene.oversampling());
-            let mask = |piece: &Piece| mask_of(piece, n, [0; 2], [view.width, view.height]);
-            let masks = threads::map(threads, &phantoms, |phantom| phantom.pieces.iter().map(mask).collect::<Vec<_>>());
-            let pieces = phantoms.iter_mut().flat_map(|phantom| &mut phantom.pieces);
-            for (piece, mask) in pieces.zip(masks.into_iter().flatten()) {
-                (piece.mask, piece.covered) = mask;
-            }
-        });
-        let path = timer.time(Stage::Light, || {
+        let timer = &assets.timer;
+        timer.time(Stage::Masks, || add_masks(&mut phantoms, &scene, work.threads));
+        let parts = timer.time(Stage::Light, || {
             buffers.light.prepare(&scene)?;
-            LightPath::new(Specimen { scene: &scene, phantoms: &phantoms, threads }, microscopes)
+            Parts::new(scene, phantoms, microscopes, &work)
         })?;
-        let feathered = feathered(&scene, &phantoms)?;
-        let detector = Detector::new(&scene)?;
-        Ok(Self { scene, phantoms, threads, path, feathered, detector, detectability: Vec::new(), timer })
+        Self::of(parts, work, timer.clone())
+    }
+
+    /// Prepares the camera of a scene.
+    pub(crate) fn of(parts: Parts, work: Work, timer: StageTimer) -> Result<Self, ErrorKind> {
+        let detector = Detector::new(&parts.scene)?;
+        Ok(Self { parts, work, detector, detectability: Vec::new(), timer })
+    }
+
+    /// Returns the parts that another camera and background can use.
+    pub(crate) fn into_parts(self) -> Parts {
+        self.parts
     }
 
     pub(crate) fn planes(&self) -> usize {
-        self.scene.planes_um.len()
+        self.parts.scene.planes_um.len()
     }
 
     /// Images one plane. Call once for each plane, in order.
     ///
     /// Eq. 13: I_f = g_po(10^(I_b − I_p) ∗ G_σxy) + g_g, and Eq. 15 before or after it.
     pub(crate) fn plane<'d>(&mut self, index: usize, buffers: &'d mut FrameBuffers) -> Result<&'d Plane, ErrorKind> {
+        let stats = self.transmit(index, buffers)?;
+        Ok(self.detect(index, &stats, buffers))
+    }
+
+    /// Computes the light that the phantoms transmit in a plane, into `buffers`.
+    pub(crate) fn transmit(&self, index: usize, buffers: &mut FrameBuffers) -> Result<TransmissionStats, ErrorKind> {
+        let focus = FocusAt::Stage(self.parts.scene.planes_um[index]);
+        self.timer.time(Stage::Light, || self.parts.path.transmit(self.specimen(), focus, &mut buffers.light))
+    }
+
+    /// Converts the transmitted light in `buffers` to grey levels.
+    pub(crate) fn detect<'d>(
+        &mut self,
+        index: usize,
+        stats: &TransmissionStats,
+        buffers: &'d mut FrameBuffers,
+    ) -> &'d Plane {
         let FrameBuffers { light, plane, exposure, .. } = buffers;
-        let stage_um = self.scene.planes_um[index];
-        let focus = FocusAt::Stage(stage_um);
-        let stats = self.timer.time(Stage::Light, || self.path.transmit(self.specimen(), focus, light))?;
-        let (scene, view, channels) = (&self.scene, self.scene.view, self.scene.channels());
+        let stage_um = self.parts.scene.planes_um[index];
+        let (scene, view, channels) = (&self.parts.scene, self.parts.scene.view, self.parts.scene.channels());
         let samples = view.width * view.height * channels;
         (plane.index, plane.stage_um, plane.channels, plane.clipped_px) = (index, stage_um, channels, stats.clipped_px);
         plane.grey.resize(samples, 0);
@@ -118,7 +185,7 @@ impl Rendering {
         let after_detection = scene.restoration.restore == Restore::AfterDetection;
         self.timer.time(Stage::Camera, || {
             exposure.start(view.width, self.camera_keys(stage_um));
-            self.path.for_each_band(view, light, |RowBand { first_row, unblurred, blurred }| {
+            self.parts.path.for_each_band(view, light, |RowBand { first_row, unblurred, blurred }| {
                 let at = first_row * view.width;
                 if !after_detection {
                     self.restore_light(at, unblurred, blurred);
@@ -138,7 +205,7 @@ impl Rendering {
                         }
                     }
                 }
-                if let (true, Some(feathered)) = (after_detection, &self.feathered) {
+                if let (true, Some(feathered)) = (after_detection, &self.parts.feathered) {
                     self.restore_grey_levels(&feathered[at..], unblurred, grey, noise_free, exposure);
                 }
             });
@@ -151,20 +218,20 @@ impl Rendering {
             plane.saturated = exposure.saturated();
         });
         self.detectability.push(self.detectabilities(&stats.absorbances, &electrons));
-        Ok(plane)
+        plane
     }
 
     fn specimen(&self) -> Specimen<'_> {
-        Specimen { scene: &self.scene, phantoms: &self.phantoms, threads: self.threads }
+        Specimen { scene: &self.parts.scene, phantoms: &self.parts.phantoms, work: &self.work }
     }
 
     fn pieces(&self) -> impl Iterator<Item = &Piece> {
-        self.phantoms.iter().flat_map(|phantom| &phantom.pieces)
+        self.parts.phantoms.iter().flat_map(|phantom| &phantom.pieces)
     }
 
     /// Returns all pieces, numbered, with their object and phantom.
     fn parts(&self) -> impl Iterator<Item = (usize, (&Object, &Phantom, &Piece))> {
-        let objects = self.scene.objects.iter().zip(&self.phantoms);
+        let objects = self.parts.scene.objects.iter().zip(&self.parts.phantoms);
         objects
             .flat_map(|(object, phantom)| phantom.pieces.iter().map(move |piece| (object, phantom, piece)))
             .enumerate()
@@ -176,8 +243,9 @@ impl Rendering {
     /// noise.
     fn camera_keys(&self, stage_um: f64) -> Vec<u64> {
         let position = libm::round(stage_um * 1e6) as i64;
-        let key = |purpose: &str| self.scene.own_key().stream("plane", position.cast_unsigned(), purpose).next_u64();
-        match self.scene.channels() {
+        let key =
+            |purpose: &str| self.parts.scene.own_key().stream("plane", position.cast_unsigned(), purpose).next_u64();
+        match self.parts.scene.channels() {
             1 => vec![key("camera")],
             _ => ["camera.red", "camera.green", "camera.blue"].map(key).to_vec(),
         }
@@ -201,13 +269,33 @@ impl Rendering {
         best
     }
 
-    /// Returns the all-in-focus image and the ground truth.
+    /// Returns the all-in-focus image and the ground truth. Call after all planes.
     pub(crate) fn finish(self, buffers: &mut FrameBuffers) -> Result<Finished, ErrorKind> {
+        let (all_in_focus, truth) = self.results(buffers)?;
+        Ok(Finished { scene: self.parts.scene, truth, all_in_focus })
+    }
+
+    /// As [`finish`](Self::finish), without the scene.
+    pub(crate) fn results(&self, buffers: &mut FrameBuffers) -> Result<(Vec<f32>, Truth), ErrorKind> {
         let several = self.planes() > 1;
         let all_in_focus =
             if several { self.timer.time(Stage::Light, || self.all_in_focus(buffers))? } else { Vec::new() };
         let truth = self.timer.time(Stage::Truth, || self.truth(buffers));
-        Ok(Finished { scene: self.scene, truth, all_in_focus })
+        Ok((all_in_focus, truth))
+    }
+
+    /// Returns the threads and the flag that cancels the image.
+    pub(crate) fn work(&self) -> &Work {
+        &self.work
+    }
+
+    pub(crate) fn work_mut(&mut self) -> &mut Work {
+        &mut self.work
+    }
+
+    /// Returns the scene.
+    pub(crate) fn scene(&self) -> &Scene {
+        &self.parts.scene
     }
 
     /// Returns the ground truth of a frame of a slide, and rows for the objects whose centre is `within` it.
@@ -220,12 +308,12 @@ impl Rendering {
         buffers: &mut FrameBuffers,
     ) -> (Truth, Vec<ObjectTruth>) {
         self.timer.time(Stage::Truth, || {
-            let origin_px = self.scene.frame.map_or([0; 2], |frame| frame.origin_px);
-            let n = self.scene.oversampling();
-            let corner = origin_px.map(|at| at as f64 * self.scene.view.pixel_um);
+            let origin_px = self.parts.scene.frame.map_or([0; 2], |frame| frame.origin_px);
+            let n = self.parts.scene.oversampling();
+            let corner = origin_px.map(|at| at as f64 * self.parts.scene.view.pixel_um);
             let mut rows = Vec::new();
             for (number, part @ (object, _, piece)) in self.parts() {
-                if object.body.kind().is_layer() || !within(self.scene.place_um(object)) {
+                if object.body.kind().is_layer() || !within(self.parts.scene.place_um(object)) {
                     continue;
                 }
                 let (mask, covered) = mask_of(piece, n, origin_px, size_px.map(|side| side as usize));
@@ -241,10 +329,10 @@ impl Rendering {
 
     fn all_in_focus(&self, buffers: &mut FrameBuffers) -> Result<Vec<f32>, ErrorKind> {
         let FrameBuffers { light, exposure, .. } = buffers;
-        self.path.transmit(self.specimen(), FocusAt::Everywhere, light)?;
-        let (view, channels) = (self.scene.view, self.scene.channels());
+        self.parts.path.transmit(self.specimen(), FocusAt::Everywhere, light)?;
+        let (view, channels) = (self.parts.scene.view, self.parts.scene.channels());
         let mut all_in_focus = vec![0.0; view.width * view.height * channels];
-        self.path.for_each_band(view, light, |RowBand { first_row, unblurred, blurred }| {
+        self.parts.path.for_each_band(view, light, |RowBand { first_row, unblurred, blurred }| {
             self.restore_light(first_row * view.width, unblurred, blurred);
             self.to_electrons(blurred);
             let out = &mut all_in_focus[first_row * view.width * channels..][..blurred[0].len() * channels];
@@ -260,7 +348,7 @@ impl Rendering {
     /// Eq. 15 as printed mixes the phantom image I_p, an absorbance, with the intensity I_f. Here the restored
     /// quantity is the light 10^(I_b − I_p) before the blur in the image plane, in the same unit.
     fn restore_light(&self, first: usize, unblurred: &[f32], blurred: &mut [&mut [f32]]) {
-        let (Some(feathered), [blurred]) = (&self.feathered, blurred) else { return };
+        let (Some(feathered), [blurred]) = (&self.parts.feathered, blurred) else { return };
         for ((blurred, unblurred), weight) in blurred.iter_mut().zip(unblurred).zip(&feathered[first..]) {
             *blurred += weight * (unblurred - *blurred);
         }
@@ -282,7 +370,7 @@ impl Rendering {
             self.detector.electrons(0, &mut electrons);
             self.detector.mean_dn_into(&[&mut electrons], &mut clean, exposure);
         }
-        let channels = self.scene.channels();
+        let channels = self.parts.scene.channels();
         let weights = weights.iter().flat_map(|weight| core::iter::repeat_n(*weight, channels));
         for (((grey, noise_free), clean), weight) in grey.iter_mut().zip(noise_free).zip(&clean).zip(weights) {
             let blend = |level: f32| level + weight * (clean - level);
@@ -299,12 +387,12 @@ impl Rendering {
     }
 
     fn truth(&self, buffers: &mut FrameBuffers) -> Truth {
-        let View { width, height, .. } = self.scene.view;
+        let View { width, height, .. } = self.parts.scene.view;
         buffers.ids.resize(width * height, 0);
         let in_image = self.parts().filter(|(_, (.., piece))| !piece.mask.is_empty());
         let rows = in_image.map(|(number, part)| self.row(number, part, &part.2.mask, part.2.covered));
         let mut objects = merge_layers(rows.collect());
-        if self.scene.frame.is_some() {
+        if self.parts.scene.frame.is_some() {
             // On a slide, layers do not occlude objects.
             objects.retain(|object| !object.kind.is_layer());
         }
@@ -328,7 +416,7 @@ impl Rendering {
         mask: &Mask,
         covered: u64,
     ) -> ObjectTruth {
-        let grid_um = self.scene.grid().pixel_um;
+        let grid_um = self.parts.scene.grid().pixel_um;
         let kind = object.body.kind();
         let tint = match &object.body {
             Body::Cell(body) if piece.part != Part::Nucleus => Some(body.tint),
@@ -347,7 +435,7 @@ impl Rendering {
             bethesda: object.bethesda.clone(),
             traits: phantom.traits.iter().copied().collect(),
             cluster: object.cluster,
-            centre_um: self.scene.place_um(object),
+            centre_um: self.parts.scene.place_um(object),
             depth_um: object.depth_um,
             mean_absorbance,
             tint,
@@ -357,10 +445,13 @@ impl Rendering {
             amodal: mask.clone(),
             visible: Mask::default(),
             defocus_um: self
+                .parts
                 .scene
                 .planes_um
                 .iter()
-                .map(|plane| self.scene.in_focus_um(self.scene.seen_at_um(*plane, object.depth_um)) - object.depth_um)
+                .map(|plane| {
+                    self.parts.scene.in_focus_um(self.parts.scene.seen_at_um(*plane, object.depth_um)) - object.depth_um
+                })
                 .collect(),
             detectability: self.detectability.iter().map(|plane| plane[number]).collect(),
         }

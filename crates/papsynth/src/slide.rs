@@ -16,7 +16,7 @@ use crate::error::{Error, ErrorKind};
 use crate::key::Key;
 use crate::phantom::{NoiseFields, Phantom};
 use crate::recipe::{Imaging, InvalidField, Optics};
-use crate::render::{FrameBuffers, Rendering, phantoms};
+use crate::render::{FrameBuffers, Rendering, Work, phantoms};
 use crate::scene::{BEYOND, Object, PLOT_PX, Plot, Population, Scene, SlideFrame, View};
 use crate::threads::{self, Threads};
 use crate::transmit::{self, LightPath};
@@ -121,7 +121,7 @@ impl<'a> Slide<'a> {
         let (population, mut empty) = Population::new(recipe, &engine.model, key).map_err(Error::Layout)?;
         empty.slide = number;
         empty.background.illumination = empty.background.illumination.weakened(recipe.scan.residual_shading);
-        let nothing = transmit::Specimen { scene: &empty, phantoms: &[], threads: Threads::One };
+        let nothing = transmit::Specimen { scene: &empty, phantoms: &[], work: &Work::on(Threads::One) };
         let path = LightPath::new(nothing, &engine.microscopes).map_err(Error::Layout)?;
         let border_px = path.image_blur_radius_px() as i64;
         let reach_px = recipe.scan.max_object_radius_um / empty.view.pixel_um;
@@ -257,7 +257,7 @@ impl<'a> Slide<'a> {
         let mut found: Vec<Option<Phantom>> = scene.objects.iter().map(|object| self.cache.get(object, n)).collect();
         let missing = scene.objects.iter().zip(&found).filter(|(_, found)| found.is_none());
         let missing: Vec<&Object> = missing.map(|(object, _)| object).collect();
-        let drawn = phantoms(&self.engine.assets, &self.noise_fields, scene, &missing, threads)?;
+        let drawn = phantoms(&self.engine.assets, &self.noise_fields, scene, &missing, &Work::on(threads))?;
         let (side, frames) = (f64::from(self.side_px()), self.frames());
         for (place, (object, phantom)) in
             found.iter_mut().filter(|found| found.is_none()).zip(missing.iter().zip(drawn))
@@ -320,7 +320,7 @@ impl<'a> Slide<'a> {
         let phantoms = self.phantoms(at, &scene, threads)?;
         self.engine.with_buffers(|buffers: &mut FrameBuffers| {
             let Engine { assets, microscopes, .. } = self.engine;
-            let mut rendering = Rendering::new(assets, microscopes, scene, phantoms, threads, buffers)?;
+            let mut rendering = Rendering::new(assets, microscopes, scene, phantoms, Work::on(threads), buffers)?;
             let mut planes = Vec::new();
             for index in 0..rendering.planes() {
                 let plane = rendering.plane(index, buffers)?;

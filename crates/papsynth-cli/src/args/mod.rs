@@ -46,11 +46,11 @@ pub(crate) use slide::{Slide, SlideTile, SlideVerb};
 pub(crate) use slide::{SlideFinalize, SlideMake};
 use values::preset_parser;
 #[cfg(feature = "web")]
-pub(crate) use web::{Study, View};
+pub(crate) use web::{Study, View, Workbench};
 #[cfg(not(feature = "judge"))]
 use {MissingFeature as Judge, MissingFeature as Match};
 #[cfg(not(feature = "web"))]
-use {MissingFeature as Study, MissingFeature as View};
+use {MissingFeature as Study, MissingFeature as View, MissingFeature as Workbench};
 
 /// Synthetic bright-field images of cervical smears with exact ground truth.
 #[derive(Debug, Parser)]
@@ -101,6 +101,7 @@ pub(crate) enum Verb {
     Slide(Box<Slide>),
     Study(Box<Study>),
     View(View),
+    Workbench(Box<Workbench>),
     Schema(SchemaArgs),
     Completions(Completions),
 }

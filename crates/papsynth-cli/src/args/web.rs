@@ -1,11 +1,13 @@
-//! Options of `study` and `view`.
+//! Options of `study`, `view` and `workbench`.
 
 use std::path::PathBuf;
 
 use clap::Args;
 use papsynth_study::{Grey, StudyParams, TrialDesign};
 
+use super::shared::EngineArgs;
 use super::values::{integer, named, parse_pixel};
+use crate::memory::parse_size;
 
 /// Run a reader study: can observers distinguish real and synthetic images?
 ///
@@ -111,6 +113,38 @@ pub(crate) struct View {
     /// Folder of the data set or slide
     #[arg(value_name = "DIR")]
     pub(crate) dir: PathBuf,
+    /// Port of the page on 127.0.0.1 [default: any free port]
+    #[arg(long, value_name = "N", value_parser = integer(1, u16::MAX))]
+    pub(crate) port: Option<u16>,
+    /// Open the page in the browser
+    #[arg(long)]
+    pub(crate) open: bool,
+}
+
+/// Change a recipe in the browser and see its image at once.
+///
+/// A page on this machine (127.0.0.1) shows every number of the recipe with its range and meaning, and one field of the
+/// recipe. A change computes only what depends on it. The page works offline, and the program writes no files: the
+/// browser saves recipe, image and label masks.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  papsynth workbench                               the default recipe
+  papsynth workbench --preset dense --open         open the browser
+  papsynth workbench my.toml --seed 7              a recipe of your own
+  papsynth workbench --with calibrated.toml        sections of `papsynth calibrate` or `papsynth match`
+  papsynth workbench --port 8080 --max-memory 2GiB
+
+The page marks what differs from the preset, the default preset for a recipe in a file. It shows the command line and
+the Python code that generate the same field, and its link holds preset, differences, seed and view: it opens the same
+field in the workbench of another person. Drag to pan, turn the wheel to zoom, turn it with Shift to focus, click to
+identify an object. Press Ctrl-C to quit.")]
+pub(crate) struct Workbench {
+    #[command(flatten)]
+    pub(crate) engine: EngineArgs,
+    /// Memory for images: a size such as 2GiB [default: 80 % of the available memory]
+    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    pub(crate) max_memory: Option<u64>,
     /// Port of the page on 127.0.0.1 [default: any free port]
     #[arg(long, value_name = "N", value_parser = integer(1, u16::MAX))]
     pub(crate) port: Option<u16>,

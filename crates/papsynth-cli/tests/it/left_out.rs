@@ -13,6 +13,7 @@ fn a_subcommand_without_its_feature_names_the_feature() {
         ("learn --class parabasal --out mine.json", "learn", cfg!(feature = "learn")),
         ("study real synthetic", "web", cfg!(feature = "web")),
         ("view fields --port 8080", "web", cfg!(feature = "web")),
+        ("workbench --preset dense", "web", cfg!(feature = "web")),
     ] {
         if !is_here {
             let run = bench.run(words);

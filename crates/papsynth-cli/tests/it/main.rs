@@ -28,3 +28,5 @@ mod study;
 mod support;
 #[cfg(feature = "web")]
 mod view;
+#[cfg(feature = "web")]
+mod workbench;

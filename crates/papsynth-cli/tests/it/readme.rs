@@ -79,7 +79,7 @@ const PARTS: &[&str] = &["--shard", "--task"];
 const NEED_ALL_PARTS: &[&str] = &["merge", "slide finalize"];
 
 /// Commands that serve a page until they are interrupted.
-const SERVERS: &[&str] = &["view", "study real"];
+const SERVERS: &[&str] = &["view", "study real", "workbench"];
 
 /// A function that writes a fixture of this name.
 type Make = fn(&Bench, &str);

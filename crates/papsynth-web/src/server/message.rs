@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// Maximum length of a request body, bytes.
+/// Maximum length of a request body, bytes, unless the [`Site`](super::Site) accepts longer ones.
 pub const MAX_BODY: usize = 4096;
 
 /// Content type of JSON.
@@ -20,7 +20,7 @@ pub struct Request<'a> {
     pub target: &'a str,
     /// Content type of the body.
     pub content_type: Option<&'a [u8]>,
-    /// Body of a POST request, at most [`MAX_BODY`] bytes; empty for other methods.
+    /// Body of a POST request; empty for other methods.
     pub body: &'a [u8],
 }
 
@@ -31,10 +31,15 @@ impl Request<'_> {
     /// # Errors
     /// The reply for a body of another type, a body that is too long, or invalid JSON.
     pub fn json<T: DeserializeOwned>(&self) -> Result<T, Reply> {
+        self.json_within(MAX_BODY)
+    }
+
+    /// As [`json`](Self::json), with another maximum length of the body, bytes.
+    pub(crate) fn json_within<T: DeserializeOwned>(&self, max_body: usize) -> Result<T, Reply> {
         if self.content_type != Some(JSON.as_bytes()) {
             return Err(Reply::error(415, "expected content type application/json"));
         }
-        if self.body.len() > MAX_BODY {
+        if self.body.len() > max_body {
             return Err(Reply::error(413, "the request body is too long"));
         }
         serde_json::from_slice(self.body).map_err(|error| Reply::error(400, &error.to_string()))
@@ -74,6 +79,12 @@ impl Reply {
     #[must_use]
     pub fn png(file: Vec<u8>) -> Self {
         Self { status: 200, content_type: "image/png", body: file.into(), allow: None }
+    }
+
+    /// Returns binary data.
+    #[must_use]
+    pub fn binary(body: Vec<u8>) -> Self {
+        Self { status: 200, content_type: "application/octet-stream", body: body.into(), allow: None }
     }
 
     /// Returns an error as JSON: `{"error": message}`.

@@ -52,7 +52,21 @@ const HEADERS: [(&str, &str); 5] = [
 pub trait Site {
     /// Returns the reply to a request. Requests from pages of other sites are rejected before. Calls are sequential.
     fn reply(&mut self, request: &Request) -> Reply;
+
+    /// Returns the maximum length of a request body, bytes.
+    fn max_body(&self) -> usize {
+        MAX_BODY
+    }
+
+    /// Returns the work that computes the reply to a request, or `None` if [`reply`](Self::reply) is fast. The work
+    /// runs on its own thread, while the site replies to other requests.
+    fn slow_reply(&mut self, _request: &Request) -> Option<SlowReply> {
+        None
+    }
 }
+
+/// Work that computes a reply.
+pub type SlowReply = Box<dyn FnOnce() -> Reply + Send>;
 
 /// State that all connections share.
 struct Shared<S> {
@@ -127,9 +141,12 @@ impl Server {
         // One thread suffices: there is one page, and its requests are short.
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
         let shared = Arc::new(Shared { origin: OriginCheck::new(self.port), site: Mutex::new(site) });
-        let _guard = runtime.enter();
+        let guard = runtime.enter();
         let listener = tokio::net::TcpListener::from_std(self.listener).map_err(failed)?;
         runtime.block_on(accept(&listener, &shared, stop, poll));
+        drop(guard);
+        // Ignores unfinished replies.
+        runtime.shutdown_background();
         Ok(())
     }
 }
@@ -179,25 +196,27 @@ async fn accept<S: Site + Send + 'static>(
 
 async fn answer<S: Site>(shared: &Shared<S>, request: hyper::Request<Incoming>) -> Reply {
     let (head, body) = request.into_parts();
-    if body.size_hint().lower() > MAX_BODY as u64 {
+    // An absolute URI would name a second host.
+    if head.uri.authority().is_some() {
+        return Reply::error(400, "expected a path, not an absolute URI");
+    }
+    // Before the body, so that other sites cannot send long ones.
+    if let Some(error) = shared.origin.rejects(&head.headers) {
+        return error;
+    }
+    let max_body = shared.site().max_body();
+    if body.size_hint().lower() > max_body as u64 {
         return Reply::error(413, "the request body is too long");
     }
     // Only the body of a POST request is read.
     let body = match head.method {
-        Method::POST => match tokio::time::timeout(REQUEST_TIMEOUT, Limited::new(body, MAX_BODY).collect()).await {
+        Method::POST => match tokio::time::timeout(REQUEST_TIMEOUT, Limited::new(body, max_body).collect()).await {
             Ok(Ok(body)) => body.to_bytes(),
             Ok(Err(_)) => return Reply::error(413, "the request body is too long or incomplete"),
             Err(_) => return Reply::error(408, "the request took too long"),
         },
         _ => Bytes::new(),
     };
-    // An absolute URI would name a second host.
-    if head.uri.authority().is_some() {
-        return Reply::error(400, "expected a path, not an absolute URI");
-    }
-    if let Some(error) = shared.origin.rejects(&head.headers) {
-        return error;
-    }
     let target = head.uri.path_and_query().map_or("", |target| target.as_str());
     let request = Request {
         method: head.method.as_str(),
@@ -205,7 +224,14 @@ async fn answer<S: Site>(shared: &Shared<S>, request: hyper::Request<Incoming>) 
         content_type: head.headers.get(CONTENT_TYPE).map(HeaderValue::as_bytes),
         body: &body,
     };
-    shared.site().reply(&request)
+    let slow = {
+        let mut site = shared.site();
+        match site.slow_reply(&request) {
+            Some(slow) => slow,
+            None => return site.reply(&request),
+        }
+    };
+    tokio::task::spawn_blocking(slow).await.unwrap_or_else(|_| Reply::error(500, "the program failed at this request"))
 }
 
 #[expect(clippy::disallowed_methods, reason = "checks the clock that hyper reads; it reaches no image")]

@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use papsynth::truth::{Bounds, Group, Mask, ObjectTruth};
+use papsynth::truth::{Bounds, Group, ObjectTruth};
 use papsynth_dataset::{Dataset, FrameLocation, FrameSummary};
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use super::grid::Grid;
-use super::labels::{Ids, colour_text};
+use super::labels::Ids;
 use super::levels::Levels;
+use super::objects::objects_at;
 use super::source::{ImageInfo, Source, TileIndex, check_pixel, check_plane, png};
 use crate::server::Reply;
 
@@ -191,37 +192,6 @@ impl Source for DatasetSource {
         let Grid { width, height, .. } = self.frame(image)?.grid;
         check_pixel(x, y, width, height)?;
         let (_, objects) = self.with_truth(image)?;
-        let holds = |mask: &Mask| {
-            mask.runs().iter().any(|run| run.y as usize == y && (run.x0 as usize..run.x1 as usize).contains(&x))
-        };
-        let mut found: Vec<&ObjectTruth> =
-            objects.iter().map(|shown| &shown.truth).filter(|truth| holds(&truth.amodal)).collect();
-        found.sort_by(|a, b| b.depth_um.total_cmp(&a.depth_um).then(b.part.cmp(&a.part)));
-        Ok(found.into_iter().map(|truth| object_json(truth, holds(&truth.visible))).collect())
+        Ok(objects_at(objects.iter().map(|shown| &shown.truth), x, y))
     }
-}
-
-/// Returns an object as JSON for the page.
-fn object_json(truth: &ObjectTruth, is_visible: bool) -> Value {
-    json!({
-        "id": truth.id,
-        "colour": colour_text(truth.id),
-        "group": truth.group().name(),
-        "part": truth.part,
-        "kind": truth.kind.name(),
-        "class": truth.class,
-        "bethesda": truth.bethesda,
-        "traits": truth.traits,
-        "cluster": truth.cluster,
-        "visible": is_visible,
-        "centre_um": truth.centre_um,
-        "depth_um": truth.depth_um,
-        "area_um2": truth.area_um2,
-        "mean_absorbance": truth.mean_absorbance,
-        "tint": truth.tint_name(),
-        "rotation_deg": truth.rotation_deg,
-        "truncated": truth.truncated,
-        "defocus_um": truth.defocus_um,
-        "detectability": truth.detectability,
-    })
 }

@@ -47,6 +47,11 @@ impl Ids {
 
     /// Returns red, green, blue and opacity of every pixel.
     pub(crate) fn rgba(&self) -> Vec<u8> {
+        self.rgba_with(FILL, colour)
+    }
+
+    /// As [`rgba`](Self::rgba), with another opacity of the fill and the colours of `colour_of` an id.
+    pub(crate) fn rgba_with(&self, fill: u8, colour_of: impl Fn(u32) -> [u8; 3]) -> Vec<u8> {
         let row = self.width + 2;
         let mut bytes = Vec::with_capacity(4 * self.width * self.height);
         for y in 1..=self.height {
@@ -57,31 +62,39 @@ impl Ids {
                 };
                 let is_other = |at: usize| self.ids[at].is_some_and(|other| other != id);
                 let is_edge = [at - 1, at + 1, at - row, at + row].into_iter().any(is_other);
-                let [red, green, blue] = colour(id);
-                bytes.extend([red, green, blue, if is_edge { u8::MAX } else { FILL }]);
+                let [red, green, blue] = colour_of(id);
+                bytes.extend([red, green, blue, if is_edge { u8::MAX } else { fill }]);
             }
         }
         bytes
     }
 }
 
-/// Returns the colour of an object, which depends on its id only.
-fn colour(id: u32) -> [u8; 3] {
-    // Fibonacci hashing: consecutive ids get colours that are far apart.
-    let hash = u64::from(id.wrapping_mul(0x9E37_79B9));
-    let number = usize::try_from((hash * 3 * COLOURS.len() as u64) >> u32::BITS).unwrap_or_default();
-    let [colour, shade] = [number % COLOURS.len(), number / COLOURS.len()];
-    let shaded = |value: u8| match shade {
+/// Returns one of 21 colours: the palette, then two shades of it.
+pub(crate) fn numbered_colour(number: usize) -> [u8; 3] {
+    let shaded = |value: u8| match number / COLOURS.len() % 3 {
         0 => value,
         1 => value - value / 4,
         _ => value + (u8::MAX - value) / 3,
     };
-    COLOURS[colour].map(shaded)
+    COLOURS[number % COLOURS.len()].map(shaded)
+}
+
+/// Returns the colour of an object, which depends on its id only.
+pub(crate) fn colour(id: u32) -> [u8; 3] {
+    // Fibonacci hashing: consecutive ids get colours that are far apart.
+    let hash = u64::from(id.wrapping_mul(0x9E37_79B9));
+    let number = usize::try_from((hash * 3 * COLOURS.len() as u64) >> u32::BITS).unwrap_or_default();
+    numbered_colour(number)
 }
 
 /// Returns the colour of an object in CSS notation.
 pub(crate) fn colour_text(id: u32) -> String {
-    let [red, green, blue] = colour(id);
+    css(colour(id))
+}
+
+/// Returns a colour in CSS notation.
+pub(crate) fn css([red, green, blue]: [u8; 3]) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")
 }
 

@@ -1,12 +1,13 @@
 //! The viewer of data sets and slides: replies to the requests of the page.
 
 mod fields;
-mod grid;
-mod labels;
+pub(crate) mod grid;
+pub(crate) mod labels;
 mod levels;
+pub(crate) mod objects;
 #[cfg(feature = "zarr")]
 mod slide;
-mod source;
+pub(crate) mod source;
 
 use std::path::Path;
 
@@ -141,14 +142,14 @@ fn slide(path: &Path) -> Result<(&'static str, Box<dyn Source>), Error> {
 }
 
 /// Returns the first characters of a word of a request, escaped.
-fn excerpt(word: &str) -> String {
+pub(crate) fn excerpt(word: &str) -> String {
     /// Maximum number of characters.
     const CHARS: usize = 30;
     word.chars().take(CHARS).flat_map(char::escape_default).collect()
 }
 
 /// Parses a number of 1 to 9 digits.
-fn number(word: &str) -> Result<usize, Reply> {
+pub(crate) fn number(word: &str) -> Result<usize, Reply> {
     let is_number = (1..=9).contains(&word.len()) && word.bytes().all(|byte| byte.is_ascii_digit());
     let number = if is_number { word.parse().ok() } else { None };
     number.ok_or_else(|| Reply::error(400, &format!("`{}`: expected a number of 1 to 9 digits", excerpt(word))))

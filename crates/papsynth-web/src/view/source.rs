@@ -70,6 +70,17 @@ pub(crate) fn check_pixel(x: usize, y: usize, width: usize, height: usize) -> Re
 
 /// Encodes bytes of 1, 3 or 4 channels per pixel as PNG.
 pub(crate) fn png(bytes: &[u8], width: usize, channels: usize) -> Result<Reply, Reply> {
+    png_of(bytes, BitDepth::Eight, width, channels)
+}
+
+/// Encodes samples of 16 bits, of 1 or 3 channels per pixel, as PNG.
+pub(crate) fn png16(samples: &[u16], width: usize, channels: usize) -> Result<Reply, Reply> {
+    let bytes: Vec<u8> = samples.iter().flat_map(|sample| sample.to_be_bytes()).collect();
+    png_of(&bytes, BitDepth::Sixteen, width, channels)
+}
+
+fn png_of(bytes: &[u8], depth: BitDepth, width: usize, channels: usize) -> Result<Reply, Reply> {
+    let sample = if depth == BitDepth::Sixteen { 2 } else { 1 };
     let color = match channels {
         1 => ColorType::Grayscale,
         3 => ColorType::Rgb,
@@ -78,9 +89,9 @@ pub(crate) fn png(bytes: &[u8], width: usize, channels: usize) -> Result<Reply, 
     let encode = || {
         let mut out = Vec::with_capacity(bytes.len() / 2);
         let side = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
-        let mut encoder = Encoder::new(&mut out, side(width), side(bytes.len() / (width * channels).max(1)));
+        let mut encoder = Encoder::new(&mut out, side(width), side(bytes.len() / (width * channels * sample).max(1)));
         encoder.set_color(color);
-        encoder.set_depth(BitDepth::Eight);
+        encoder.set_depth(depth);
         encoder.set_compression(Compression::Fast);
         encoder.set_filter(Filter::Up);
         let mut writer = encoder.write_header()?;

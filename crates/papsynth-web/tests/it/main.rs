@@ -8,3 +8,4 @@ mod support;
 mod view;
 mod view_http;
 mod view_slide;
+mod workbench;

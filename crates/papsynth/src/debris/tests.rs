@@ -36,7 +36,9 @@ fn draw(debris: &Debris) -> Scene {
 fn phantoms(scene: &Scene) -> Vec<(ObjectKind, Phantom)> {
     let generator = NoiseFieldGenerator::new();
     let noise_fields = generator.fields(scene.key);
-    let made = |object: &Object| Some((object.body.kind(), crate::phantom::debris(scene, &noise_fields, object)?));
+    let made = |object: &Object| {
+        Some((object.body.kind(), crate::phantom::debris(&scene.of_phantoms(), &noise_fields, object)?))
+    };
     scene.objects.iter().filter_map(made).collect()
 }
 
@@ -289,7 +291,7 @@ fn at_most_one_percent_of_debris_exceeds_its_maximum_radius() {
         let noise_fields = generator.fields(scene.key);
         let (mut beyond, mut largest, mut total) = (0, 0.0_f64, 0);
         for object in &scene.objects {
-            let Some(phantom) = crate::phantom::debris(&scene, &noise_fields, object) else { continue };
+            let Some(phantom) = crate::phantom::debris(&scene.of_phantoms(), &noise_fields, object) else { continue };
             let limit_um = object.body.reach_um(scene.view.pixel_um) + 2.0 * scene.view.pixel_um;
             let ratio = reach_um(&scene, object, &phantom) / limit_um;
             (total, largest) = (total + 1, largest.max(ratio));
@@ -313,11 +315,12 @@ fn at_most_half_a_percent_of_cells_exceeds_its_maximum_radius() {
         let model = Model::builtin();
         let scene = scene::draw(&recipe, &model, None, KEY).unwrap();
         let timer = crate::profile::StageTimer(None);
-        let assets = crate::phantom::PhantomAssets::new(&recipe, &model, timer).unwrap();
+        let settings = crate::phantom::PhantomSettings::of(&recipe);
+        let assets = crate::phantom::PhantomAssets::new(settings, &model, timer).unwrap();
         let noise_fields = assets.noise_fields.fields(scene.key);
         let objects: Vec<&Object> = scene.objects.iter().collect();
         for (object, phantom) in
-            objects.iter().zip(crate::phantom::make(&assets, &scene, &noise_fields, &objects).unwrap())
+            objects.iter().zip(crate::phantom::make(&assets, &scene.of_phantoms(), &noise_fields, &objects).unwrap())
         {
             let ratio = reach_um(&scene, object, &phantom) / object.body.reach_um(scene.view.pixel_um);
             (total, largest) = (total + 1, largest.max(ratio));

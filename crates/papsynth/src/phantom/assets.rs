@@ -17,12 +17,47 @@ use crate::key::{Key, Stream};
 use crate::model::{CellClass, Model, OutlineForm, Shapes};
 use crate::profile::StageTimer;
 use crate::random;
-use crate::recipe::{Acceptance, Recipe, Seam, ShapeSpread, Sheet};
+use crate::recipe::{Acceptance, Chromatin, Number, Recipe, Seam, ShapeSpread, Sheet};
+
+/// The part of a recipe that phantoms depend on, in addition to the scene.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct PhantomSettings {
+    /// Names of the classes of cells.
+    classes: Vec<String>,
+    sheet: Sheet,
+    /// Variation of the outlines of cytoplasm, and of nuclei.
+    shapes: [ShapeSpread; 2],
+    pub(crate) chromatin: Chromatin,
+    pub(crate) donors: Number,
+    patch_um: Number,
+    overlap_um: Number,
+    acceptance: Acceptance,
+    d_max: Number,
+    seam: Seam,
+}
+
+impl PhantomSettings {
+    pub(crate) fn of(recipe: &Recipe) -> Self {
+        let (nucleus, cytoplasm) = (&recipe.nucleus, &recipe.cytoplasm);
+        Self {
+            classes: recipe.cells.keys().cloned().collect(),
+            sheet: cytoplasm.sheet,
+            shapes: [cytoplasm.shape, nucleus.shape],
+            chromatin: nucleus.chromatin,
+            donors: nucleus.donors.clone(),
+            patch_um: nucleus.patch_um.clone(),
+            overlap_um: nucleus.overlap_um.clone(),
+            acceptance: nucleus.acceptance,
+            d_max: nucleus.d_max.clone(),
+            seam: nucleus.seam,
+        }
+    }
+}
 
 /// Data for drawing phantoms, shared by all images of one recipe.
 #[derive(Debug)]
 pub(crate) struct PhantomAssets {
-    pub(crate) recipe: Recipe,
+    pub(crate) settings: PhantomSettings,
     pub(crate) classes: BTreeMap<String, ClassAssets>,
     /// Cloth simulation of cytoplasm sheets; `None` for flat sheets.
     pub(crate) cloth: Option<Cloth>,
@@ -57,18 +92,18 @@ pub(crate) struct ClassAssets {
 }
 
 impl PhantomAssets {
-    pub(crate) fn new(recipe: &Recipe, model: &Model, timer: StageTimer) -> Result<Self, ErrorKind> {
+    pub(crate) fn new(settings: PhantomSettings, model: &Model, timer: StageTimer) -> Result<Self, ErrorKind> {
         let mut classes = BTreeMap::new();
-        for name in recipe.cells.keys() {
-            classes.insert(name.clone(), ClassAssets::new(name, model.class(name)?, recipe)?);
+        for name in &settings.classes {
+            classes.insert(name.clone(), ClassAssets::new(name, model.class(name)?, &settings)?);
         }
-        let cloth = match recipe.cytoplasm.sheet {
+        let cloth = match settings.sheet {
             Sheet::Flat => None,
             Sheet::Verlet => Some(ClothParams::paper()),
             Sheet::Xpbd => Some(ClothParams::default()),
         };
         Ok(Self {
-            recipe: recipe.clone(),
+            settings,
             classes,
             cloth: cloth.map(|params| Cloth::new(&params).expect("the built-in cloth parameters are valid")),
             cytoskeletons: Cytoskeletons::new(),
@@ -102,7 +137,7 @@ impl Cytoskeletons {
 }
 
 impl ClassAssets {
-    fn new(name: &str, class: &CellClass, recipe: &Recipe) -> Result<Self, ErrorKind> {
+    fn new(name: &str, class: &CellClass, settings: &PhantomSettings) -> Result<Self, ErrorKind> {
         let model = |shapes: &Shapes, spread: ShapeSpread| {
             let statistics = match spread {
                 ShapeSpread::Correlated => &shapes.correlated,
@@ -111,10 +146,10 @@ impl ClassAssets {
             ShapeModel::from_statistics(statistics.clone())
                 .map_err(|error| ErrorKind::Shapes(format!("classes.{name}"), error))
         };
-        let cytoplasm = model(&class.cytoplasm.shapes, recipe.cytoplasm.shape)?;
-        let nucleus = Arc::new(model(&class.nucleus.shapes, recipe.nucleus.shape)?);
+        let cytoplasm = model(&class.cytoplasm.shapes, settings.shapes[0])?;
+        let nucleus = Arc::new(model(&class.nucleus.shapes, settings.shapes[1])?);
         let donors = DonorSet::new(name, &class.nucleus, &nucleus)?;
-        let quilt = quilt(recipe, class, donors.pixel_um);
+        let quilt = quilt(settings, class, donors.pixel_um);
         Ok(Self { class: class.clone(), cytoplasm, nucleus, donors, quilt })
     }
 
@@ -172,11 +207,10 @@ fn formed(drawn: &Descriptors, form: &OutlineForm, rng: &mut Stream) -> Descript
 const TEST_POINTS: usize = 240;
 
 /// Returns the quilting parameters of a recipe for donors with this pixel size.
-fn quilt(recipe: &Recipe, class: &CellClass, pixel_um: f64) -> QuiltParams {
-    let nucleus = &recipe.nucleus;
+fn quilt(nucleus: &PhantomSettings, class: &CellClass, pixel_um: f64) -> QuiltParams {
     let pixels = |um: f64, least: usize| random::count(um / pixel_um).max(least);
     // All patches of a quilt have the same size: the midpoints of the recipe's ranges.
-    let midpoint = |number: &crate::recipe::Number| number.bounds().iter().sum::<f64>() / 2.0;
+    let midpoint = |number: &Number| number.bounds().iter().sum::<f64>() / 2.0;
     let (overlap_px, core_px) = (pixels(midpoint(&nucleus.overlap_um), 1), pixels(midpoint(&nucleus.patch_um), 2));
     let patch_px = core_px + overlap_px;
     let default = QuiltParams::default();

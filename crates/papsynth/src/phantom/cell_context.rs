@@ -2,14 +2,15 @@
 
 use super::assets::PhantomAssets;
 use super::noise_fields::NoiseFields;
+use super::phantom_scene::PhantomScene;
 use crate::key::Stream;
-use crate::scene::{CellBody, Object, Scene};
+use crate::scene::{CellBody, Object};
 
 /// A cell and the shared data for drawing its phantom.
 #[derive(Clone, Copy)]
 pub(super) struct CellContext<'a> {
     pub(super) assets: &'a PhantomAssets,
-    pub(super) scene: &'a Scene,
+    pub(super) scene: &'a PhantomScene,
     pub(super) noise_fields: &'a NoiseFields<'a>,
     pub(super) object: &'a Object,
     pub(super) body: &'a CellBody,

@@ -13,6 +13,7 @@ mod interpolation;
 pub(crate) mod noise_fields;
 mod nucleus;
 pub(crate) mod parametric_shape;
+mod phantom_scene;
 pub(crate) mod piece;
 mod texture_pool;
 pub(crate) mod tile;
@@ -20,11 +21,12 @@ pub(crate) mod tile;
 use crate::debris::{ObjectContext, add_coat};
 use crate::error::ErrorKind;
 use crate::profile::Stage;
-use crate::scene::{Body, Object, Scene, View};
+use crate::scene::{Body, Object, View};
 
-pub(crate) use assets::PhantomAssets;
+pub(crate) use assets::{PhantomAssets, PhantomSettings};
 use cell_context::CellContext;
 pub(crate) use noise_fields::NoiseFields;
+pub(crate) use phantom_scene::PhantomScene;
 pub(crate) use piece::{Phantom, Piece};
 
 /// Draws the phantoms of a batch of objects.
@@ -32,7 +34,7 @@ pub(crate) use piece::{Phantom, Piece};
 /// Sheets of a batch are simulated in SIMD lanes. The result does not depend on the grouping into batches.
 pub(crate) fn make<'a>(
     assets: &'a PhantomAssets,
-    scene: &'a Scene,
+    scene: &'a PhantomScene,
     noise_fields: &'a NoiseFields<'a>,
     objects: &[&'a Object],
 ) -> Result<Vec<Phantom>, ErrorKind> {
@@ -57,16 +59,16 @@ pub(crate) fn make<'a>(
 }
 
 /// Draws the phantom of an object other than an epithelial cell.
-pub(crate) fn debris(scene: &Scene, noise_fields: &NoiseFields<'_>, object: &Object) -> Option<Phantom> {
+pub(crate) fn debris(scene: &PhantomScene, noise_fields: &NoiseFields<'_>, object: &Object) -> Option<Phantom> {
     object.body.phantom(&object_context(scene, noise_fields, object))
 }
 
-fn object_context<'a>(scene: &Scene, noise_fields: &'a NoiseFields<'a>, object: &Object) -> ObjectContext<'a> {
+fn object_context<'a>(scene: &PhantomScene, noise_fields: &'a NoiseFields<'a>, object: &Object) -> ObjectContext<'a> {
     let grid = scene.grid();
     ObjectContext {
         dyes: scene.dyes,
         view: scene.view,
-        oversampling: scene.oversampling(),
+        oversampling: scene.oversampling,
         key: scene.key_of(object),
         kind: object.body.kind().name(),
         number: object.number,

@@ -69,14 +69,14 @@ pub(super) fn make(cell: &CellContext<'_>, class: &ClassAssets) -> Result<Piece,
     inner.cover(&scaled_about(&outline, centre, shrink));
 
     let mut rng = cell.stream("nucleus.texture");
-    let mut texture = match assets.recipe.nucleus.chromatin {
+    let mut texture = match assets.settings.chromatin {
         Chromatin::Quilt => {
-            let donors = assets.recipe.nucleus.donors.draw_count(&mut rng).max(1);
+            let donors = assets.settings.donors.draw_count(&mut rng).max(1);
             class.donors.quilt(&coverage, pixel_um, donors, &class.quilt, &mut rng)?
         }
         Chromatin::Field => class.donors.field(&coverage, pixel_um, &mut rng),
     };
-    let imaged = class.donors.imaged && assets.recipe.nucleus.chromatin == Chromatin::Quilt;
+    let imaged = class.donors.imaged && assets.settings.chromatin == Chromatin::Quilt;
     if nucleus.clumping > 0.0 && !imaged {
         clump(&mut texture, &coverage, cell);
     }

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 use super::imaging::{Fusion, Restoration, SceneBackground, SceneDyes, SceneLight, SceneOptics};
 use super::view::View;
 use crate::debris::{Body, Coat};
-use crate::key::{Key, Stream};
+use crate::key::Key;
+use crate::phantom::PhantomScene;
 use crate::recipe::camera::SceneCamera;
 
 /// A field of view: its objects and how it is imaged.
@@ -130,8 +131,25 @@ impl Scene {
     /// Returns the grid on which the slide is rendered: that of the image, or a finer one.
     #[must_use]
     pub fn grid(&self) -> View {
-        let n = self.oversampling();
-        View { width: self.view.width * n, height: self.view.height * n, pixel_um: self.view.pixel_um / n as f64 }
+        self.view.finer(self.oversampling())
+    }
+
+    /// Returns the part of the scene that phantoms depend on.
+    pub(crate) fn of_phantoms(&self) -> PhantomScene {
+        PhantomScene { key: self.key, view: self.view, oversampling: self.oversampling(), dyes: self.dyes }
+    }
+
+    /// Returns the same objects in an image with pixels `factor` times as large, and one sample of the slide for each
+    /// pixel: a preview that is computed several times faster. Width and height are rounded down to whole pixels.
+    #[must_use]
+    pub fn reduced(mut self, factor: usize) -> Self {
+        let View { width, height, pixel_um } = self.view;
+        let factor = factor.clamp(1, width.min(height).max(1));
+        self.view = View { width: width / factor, height: height / factor, pixel_um: pixel_um * factor as f64 };
+        if let (SceneOptics::BrightField(microscope), true) = (&mut self.optics, factor > 1) {
+            microscope.oversampling = 1;
+        }
+        self
     }
 
     /// Returns the oversampling: samples of the slide along the side of a pixel.
@@ -141,15 +159,6 @@ impl Scene {
             SceneOptics::BrightField(microscope) => microscope.oversampling as usize,
             SceneOptics::Gaussian { .. } => 1,
         }
-    }
-
-    /// Returns the grid of cytoplasm: that of the image if it is fine enough for wrinkles, otherwise that of the slide.
-    pub(crate) fn sheet_grid(&self) -> View {
-        /// The maximum of a sampled Gaussian varies by 2·exp(−2π²σ²/p²) with its position, for samples at distance p:
-        /// by nothing at σ = .34 µm, the centre of the default; at σ = .11 µm, its minimum, by 5 % for p = .25 µm and
-        /// by 25 % for p = .33 µm.
-        const COARSEST_UM: f64 = 0.35;
-        if self.view.pixel_um <= COARSEST_UM { self.view } else { self.grid() }
     }
 
     /// Returns the depth in focus at a position of the stage, µm. Because of refraction at the cover glass, it is 1.5
@@ -168,16 +177,6 @@ impl Scene {
     pub fn seen_at_um(&self, plane_um: f64, depth_um: f64) -> f64 {
         // Depth and position are proportional.
         self.fusion.map_or(plane_um, |fusion| fusion.nearest_um(depth_um / self.in_focus_um(1.0)))
-    }
-
-    /// Returns the stream of a purpose of an object.
-    pub(crate) fn stream(&self, kind: &str, object: &Object, purpose: &str) -> Stream {
-        self.key_of(object).stream(kind, object.number, purpose)
-    }
-
-    /// Returns the key of the streams of an object: that of the scene, or of its plot.
-    pub(crate) fn key_of(&self, object: &Object) -> Key {
-        object.plot.map_or(self.key, |plot| self.key.plot(plot.number))
     }
 
     /// Returns the key of the streams of the complete image.

@@ -26,6 +26,11 @@ impl View {
         [point_um[0] / self.pixel_um - 0.5, point_um[1] / self.pixel_um - 0.5]
     }
 
+    /// Returns the grid with `n` points per pixel and axis.
+    pub(crate) fn finer(self, n: usize) -> Self {
+        Self { width: self.width * n, height: self.height * n, pixel_um: self.pixel_um / n as f64 }
+    }
+
     /// Returns width and height, µm.
     #[must_use]
     pub fn size_um(&self) -> [f64; 2] {

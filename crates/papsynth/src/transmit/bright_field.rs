@@ -123,7 +123,7 @@ impl BrightFieldPath {
                 // The multislice image replaces the product.
                 stats.clipped_px = 0;
                 let indices: Vec<usize> = (0..lights.len()).collect();
-                let images = threads::map(specimen.threads, &indices, |&light| {
+                let images = threads::map(specimen.work.threads, &indices, |&light| {
                     let ChannelLight { imager, shift_um, .. } = &group.lights[light];
                     abbe_image(specimen, &self.optics, imager.microscope(), (&group.mixer, light), stage_um - shift_um)
                 });
@@ -180,7 +180,7 @@ impl BrightFieldPath {
         let mut absorbances = vec![Vec::new(); lights.len()];
         let image = |index: usize| self.image_object(specimen, index, focus, group, spare);
         threads::each(
-            specimen.threads,
+            specimen.work.threads,
             specimen.phantoms.len(),
             image,
             |index, object_factors: Result<_, ErrorKind>| {
@@ -232,6 +232,7 @@ impl BrightFieldPath {
         group: &LightGroup,
         spare: &Mutex<Vec<PatchBuffers>>,
     ) -> Result<Option<ObjectFactors>, ErrorKind> {
+        specimen.work.cancellation.check()?;
         let (object, phantom) = (&specimen.scene.objects[index], &specimen.phantoms[index]);
         // Depth and stage position.
         let position = |light: &ChannelLight| match at {

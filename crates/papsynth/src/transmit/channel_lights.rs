@@ -56,7 +56,7 @@ pub(super) fn light_groups(
     };
     let n = scene.oversampling();
     let group = |mixer: DyeMixer, lights: Vec<ChannelLight>| {
-        let fractions = threads::map(specimen.threads, specimen.phantoms, |phantom| mixer.fractions(phantom, n));
+        let fractions = threads::map(specimen.work.threads, specimen.phantoms, |phantom| mixer.fractions(phantom, n));
         LightGroup { mixer, lights, fractions }
     };
     match scene.light {

@@ -75,6 +75,7 @@ impl GaussianPath {
         clear(&mut light.channels[0], self.frame.width * self.frame.height);
         let mut absorbances = Vec::new();
         let blur = |index: usize| {
+            specimen.work.cancellation.check()?;
             let defocus_um = match focus {
                 FocusAt::Everywhere => 0.0,
                 // σ grows with the distance from focus: the exact depth of the object, in every plane.
@@ -88,7 +89,7 @@ impl GaussianPath {
             Ok(pieces.map(|piece| self.blur_piece(piece, gaussian.as_ref())).collect::<Vec<_>>())
         };
         // Eq. 14: I_p = Σ pᵢ ∗ G_σz, in the order of the objects.
-        threads::each(specimen.threads, specimen.phantoms.len(), blur, |_, pieces: Result<_, ErrorKind>| {
+        threads::each(specimen.work.threads, specimen.phantoms.len(), blur, |_, pieces: Result<_, ErrorKind>| {
             for piece in pieces? {
                 absorbances.push(piece.mean * f64::from(piece.strength));
                 let Some(tile) = piece.tile else { continue };

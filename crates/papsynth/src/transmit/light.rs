@@ -9,8 +9,8 @@ use super::bright_field::PatchBuffers;
 use super::sensor_dust;
 use crate::error::ErrorKind;
 use crate::phantom::Phantom;
+use crate::render::Work;
 use crate::scene::{Scene, SceneIllumination};
-use crate::threads::Threads;
 
 /// The plane in focus.
 #[derive(Debug, Clone, Copy)]
@@ -21,12 +21,12 @@ pub(crate) enum FocusAt {
     Everywhere,
 }
 
-/// A scene with its phantoms, and the threads that image it.
+/// A scene with its phantoms, and how it is imaged.
 #[derive(Clone, Copy)]
 pub(crate) struct Specimen<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) phantoms: &'a [Phantom],
-    pub(crate) threads: Threads,
+    pub(crate) work: &'a Work,
 }
 
 /// Buffers for the light of a plane.
@@ -49,7 +49,7 @@ pub(crate) struct LightBuffers {
 }
 
 /// Statistics of the transmission through the objects of a plane.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct TransmissionStats {
     /// For each channel, the mean absorbance over its mask of each piece of each phantom, in order.
     pub(crate) absorbances: Vec<Vec<f64>>,
@@ -60,13 +60,46 @@ pub(crate) struct TransmissionStats {
 impl LightBuffers {
     /// Computes the light of the empty slide of a scene.
     pub(crate) fn prepare(&mut self, scene: &Scene) -> Result<(), ErrorKind> {
-        let view = scene.view;
-        self.empty_log10.resize(view.width * view.height, 0.0);
-        background(scene)?.log10_into(&mut self.empty_log10, view.width, [0, 0]);
-        sensor_dust::add(&mut self.empty_log10, view.width, &scene.camera);
-        self.channels.resize(scene.channels(), Vec::new());
+        let mut empty_log10 = std::mem::take(&mut self.empty_log10);
+        empty_light(scene, &mut empty_log10)?;
+        self.empty_log10 = empty_log10;
+        self.finish_empty(scene);
         Ok(())
     }
+
+    /// Uses the [`empty_light`] of a scene that was computed before.
+    pub(crate) fn prepare_from(&mut self, scene: &Scene, empty_log10: &[f32]) {
+        self.empty_log10.clear();
+        self.empty_log10.extend_from_slice(empty_log10);
+        self.finish_empty(scene);
+    }
+
+    fn finish_empty(&mut self, scene: &Scene) {
+        sensor_dust::add(&mut self.empty_log10, scene.view.width, &scene.camera);
+        self.channels.resize(scene.channels(), Vec::new());
+    }
+
+    /// Returns the transmitted fraction in each channel, after [`LightPath::transmit`](super::LightPath::transmit).
+    pub(crate) fn transmitted(&self) -> &[Vec<f32>] {
+        &self.channels
+    }
+
+    /// Replaces the transmitted fraction in each channel.
+    pub(crate) fn set_transmitted(&mut self, channels: &[Vec<f32>]) {
+        self.channels.resize(channels.len(), Vec::new());
+        for (own, channel) in self.channels.iter_mut().zip(channels) {
+            own.clear();
+            own.extend_from_slice(channel);
+        }
+    }
+}
+
+/// Writes the logarithm of the light of the empty slide without dust on the sensor (Eq. 10).
+pub(crate) fn empty_light(scene: &Scene, empty_log10: &mut Vec<f32>) -> Result<(), ErrorKind> {
+    let view = scene.view;
+    empty_log10.resize(view.width * view.height, 0.0);
+    background(scene)?.log10_into(empty_log10, view.width, [0, 0]);
+    Ok(())
 }
 
 /// Returns the background of a scene (Eqs. 8–10), in fractions of full scale.

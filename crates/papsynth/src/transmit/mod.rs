@@ -21,7 +21,7 @@ use crate::scene::{Scene, SceneOptics, View};
 use bright_field::BrightFieldPath;
 pub(crate) use channel_lights::MicroscopeCache;
 use gaussian::GaussianPath;
-pub(crate) use light::{FocusAt, LightBuffers, Specimen, TransmissionStats};
+pub(crate) use light::{FocusAt, LightBuffers, Specimen, TransmissionStats, empty_light};
 
 /// Rows per band: few enough that a band stays in the cache of one core between light and grey levels.
 pub(crate) const BAND_ROWS: usize = 32;

@@ -109,7 +109,7 @@ impl Overlaps {
             return Ok(());
         }
         let n = specimen.scene.oversampling();
-        let objects = threads::map(specimen.threads, &self.objects, |&index| {
+        let objects = threads::map(specimen.work.threads, &self.objects, |&index| {
             StainedObject::new(colour, &specimen.phantoms[index], n, blur_px(index))
         });
         let objects = objects.into_iter().collect::<Result<Vec<_>, ErrorKind>>()?;

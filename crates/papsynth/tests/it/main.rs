@@ -4,6 +4,7 @@ mod camera;
 mod density;
 mod golden;
 mod light;
+mod live;
 mod nuclei;
 mod outlines;
 mod same_bytes;

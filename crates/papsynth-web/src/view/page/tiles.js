@@ -1,18 +1,11 @@
 "use strict";
 
-// The centre of the canvas is (view.x, view.y) in image pixels; view.zoom is the number of page pixels per image pixel. Tiles of the
-// level that suits the zoom are requested; until they arrive, coarser ones are drawn.
+// Tiles of the level that suits the zoom are requested; until they arrive, coarser ones are drawn.
 
-/** Parallel requests; cached tiles; maximum zoom; pointer movement allowed in a click; retry interval. */
-const [AT_ONCE, KEPT, NEAREST, CLICK_PX, RETRY_MS] = [6, 400, 32, 4, 2000];
-
-const canvas = element("canvas");
-const context = canvas.getContext("2d");
-const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
+/** Parallel requests; cached tiles; retry interval. */
+const [AT_ONCE, KEPT, RETRY_MS] = [6, 400, 2000];
 
 let info = null;
-let image = null;
-const view = { number: 0, plane: 0, x: 0, y: 0, zoom: 1 };
 
 /** The previous plane, drawn while the next one loads. */
 let before = 0;
@@ -20,19 +13,11 @@ let before = 0;
 /** Visibility and opacity of each label group. */
 const groups = new Map();
 
-/** The clicked pixel. */
-let mark = null;
-
 /** Tiles by address: an image, "asked", "absent" or "broken"; least recently used first. */
 const tiles = new Map();
 let underway = 0;
 
 // Requests
-
-function say(text) {
-  element("message").textContent = text;
-  element("message").hidden = !text;
-}
 
 async function load(address) {
   tiles.set(address, "asked");
@@ -77,10 +62,6 @@ function forget(needed) {
 const addressOf = (layer, level, row, column) => `${layer}/${level}/${row}-${column}.png`;
 const planeLayer = (plane) => `tile/${view.number}/${plane}`;
 
-/** Converts image to screen coordinates, rounded so that tiles join without a seam. */
-const onScreenX = (x) => Math.round(((x - view.x) * view.zoom + canvas.clientWidth / 2) * devicePixelRatio);
-const onScreenY = (y) => Math.round(((y - view.y) * view.zoom + canvas.clientHeight / 2) * devicePixelRatio);
-
 /** Returns the level whose pixels are at most as large as screen pixels, or the finest. */
 const levelNow = () => clamp(Math.floor(1e-6 - Math.log2(view.zoom * devicePixelRatio)), 0, image.levels - 1);
 
@@ -123,22 +104,8 @@ function drawTile(layers, level, row, column) {
   }
 }
 
-let drawing = false;
-
-function redraw() {
-  document.body.dataset.ready = false;
-  if (drawing) return;
-  drawing = true;
-  requestAnimationFrame(() => {
-    drawing = false;
-    if (image) draw();
-  });
-}
-
 function draw() {
-  const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((side) => Math.round(side * devicePixelRatio));
-  if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-  context.clearRect(0, 0, width, height);
+  clearCanvas();
   // Background of the image, visible where tiles are missing.
   const [x, y] = [onScreenX(0), onScreenY(0)];
   context.fillStyle = "#24282d";
@@ -172,30 +139,4 @@ function draw() {
   document.body.dataset.ready = isHere;
   drawScale();
   keepPlace();
-}
-
-function drawMark() {
-  if (!mark) return;
-  const [x, y] = [onScreenX(mark.x + 0.5), onScreenY(mark.y + 0.5)];
-  const [inner, outer] = [5, 13].map((length) => length * devicePixelRatio);
-  for (const [width, colour] of [[5, "#fff"], [2, "#111"]]) {
-    context.beginPath();
-    for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
-      context.moveTo(x + inner * dx, y + inner * dy);
-      context.lineTo(x + outer * dx, y + outer * dy);
-    }
-    Object.assign(context, { lineWidth: width * devicePixelRatio, strokeStyle: colour });
-    context.stroke();
-  }
-}
-
-/** A bar of 1, 2 or 5 times a power of ten, at most 160 pixels long. */
-function drawScale() {
-  const most = (160 * image.pixel_um) / view.zoom;
-  const power = 10 ** Math.floor(Math.log10(most));
-  const um = [5, 2, 1].map((times) => times * power).find((length) => length <= most) ?? power;
-  const text = um >= 1000 ? `${um / 1000} mm` : `${Number(um.toPrecision(1))} µm`;
-  element("scale-bar").style.width = `${(um / image.pixel_um) * view.zoom}px`;
-  element("scale-text").textContent = text;
-  element("scale").setAttribute("aria-label", `Scale bar of ${text}`);
 }

@@ -2,33 +2,6 @@
 
 // Input handling and the side panel. tiles.js draws the canvas.
 
-// View position
-
-function fit() {
-  Object.assign(view, { x: image.width / 2, y: image.height / 2, zoom: farthest() });
-  redraw();
-}
-
-/** The zoom that shows all of the image. */
-const farthest = () =>
-  Math.max(0.96 * Math.min(canvas.clientWidth / image.width, canvas.clientHeight / image.height), 1e-6);
-
-function move(dx, dy) {
-  view.x = clamp(view.x + dx / view.zoom, 0, image.width);
-  view.y = clamp(view.y + dy / view.zoom, 0, image.height);
-  redraw();
-}
-
-/** Zooms around a point of the canvas. */
-function zoomBy(factor, x = canvas.clientWidth / 2, y = canvas.clientHeight / 2) {
-  const [dx, dy] = [x - canvas.clientWidth / 2, y - canvas.clientHeight / 2];
-  const zoom = clamp(view.zoom * factor, Math.min(farthest(), 1) / 2, NEAREST);
-  view.x += dx / view.zoom - dx / zoom;
-  view.y += dy / view.zoom - dy / zoom;
-  view.zoom = zoom;
-  move(0, 0);
-}
-
 /** Panel entries that depend on the plane. */
 let perPlane = [];
 
@@ -123,42 +96,11 @@ function keptPlace() {
 
 // Object details
 
-function made(tag, text, className) {
-  const node = document.createElement(tag);
-  node.append(...[text].flat());
-  if (className) node.className = className;
-  return node;
-}
-
 const ofPlane = (values, unit) => `${minus(values[view.plane] ?? values[0], 1)}${unit}`;
 
-function card(object) {
-  const node = made("article", []);
-  const heading = made("h3", [object.class ?? object.group, made("span", `${object.part ?? ""} ${object.id}`.trim())]);
-  node.style.borderLeftColor = object.colour;
-  const list = made("dl", []);
-  const row = (name, value) => {
-    const cell = made("dd", value ?? "");
-    if (value !== undefined && value !== "") list.append(made("dt", name), cell);
-    return cell;
-  };
-  row("Bethesda", object.bethesda);
-  row("traits", object.traits?.replaceAll(";", ", "));
-  row("tint", object.tint);
-  if (object.class !== undefined) {
-    row("depth", `${minus(object.depth_um, 1)} µm`);
-    const planes = (name, values, unit) =>
-      values.length && perPlane.push({ node: row(name, ofPlane(values, unit)), values, unit });
-    planes("defocus", object.defocus_um, " µm");
-    planes("contrast / noise", object.detectability, "");
-    row("area", `${object.area_um2.toFixed(object.area_um2 < 100 ? 1 : 0)} µm²`);
-    row("absorbance", object.mean_absorbance.toFixed(2));
-    row("cluster", object.cluster || "");
-    const hints = [object.visible ? "" : "partly hidden", object.truncated ? "cut by the border" : ""].filter(Boolean);
-    row("", hints.join(", "));
-  }
-  node.append(heading, list);
-  return node;
+function addPerPlane(node, values, unit) {
+  perPlane.push({ node, values, unit });
+  node.textContent = ofPlane(values, unit);
 }
 
 async function look(x, y) {
@@ -170,7 +112,7 @@ async function look(x, y) {
     const { objects } = await (await request(`at/${view.number}/${x}/${y}`)).json();
     if (mark?.x !== x || mark?.y !== y) return;
     perPlane = [];
-    const nodes = objects.length ? objects.map(card) : [made("p", "No object here.", "quiet")];
+    const nodes = objects.length ? objects.map((object) => card(object, addPerPlane)) : [made("p", "No object here.", "quiet")];
     element("objects").replaceChildren(...nodes);
   } catch (error) {
     element("objects").replaceChildren(made("p", error.message, "quiet"));
@@ -179,65 +121,14 @@ async function look(x, y) {
 
 // Pointer and keyboard
 
-const placeOf = (event) => {
-  const box = canvas.getBoundingClientRect();
-  const [x, y] = [event.clientX - box.x, event.clientY - box.y];
-  return { x, y, px: view.x + (x - box.width / 2) / view.zoom, py: view.y + (y - box.height / 2) / view.zoom };
-};
+const focusBy = (steps) => showPlane(view.plane + steps);
 
-/** Active pointers. */
-const down = new Map();
-let travelled = 0;
-
-canvas.addEventListener("pointerdown", (event) => {
-  if (event.button !== 0) return;
-  canvas.setPointerCapture(event.pointerId);
-  if (down.size === 0) travelled = 0;
-  down.set(event.pointerId, placeOf(event));
-});
-
-canvas.addEventListener("pointermove", (event) => {
-  if (!image) return;
-  const to = placeOf(event);
-  const from = down.get(event.pointerId);
-  if (from) {
-    travelled += Math.hypot(to.x - from.x, to.y - from.y);
-    const other = [...down].find(([id]) => id !== event.pointerId)?.[1];
-    if (other) {
-      const apart = (point) => Math.max(Math.hypot(point.x - other.x, point.y - other.y), 1);
-      zoomBy(apart(to) / apart(from), other.x, other.y);
-    } else if (travelled > CLICK_PX) {
-      canvas.classList.add("dragged");
-      move(from.x - to.x, from.y - to.y);
-    }
-    down.set(event.pointerId, to);
-  }
-  const [x, y] = [placeOf(event).px, placeOf(event).py];
+/** Shows the position of the pointer. */
+function pointAt(x, y) {
   const um = (px) => minus(px * image.pixel_um, 1);
   element("position").textContent = `${Math.floor(x)}, ${Math.floor(y)} px · ${um(x)}, ${um(y)} µm`;
-});
+}
 
-const release = (event) => {
-  const was = down.delete(event.pointerId);
-  if (down.size === 0) canvas.classList.remove("dragged");
-  if (!was || event.type !== "pointerup" || travelled > CLICK_PX || !image) return;
-  const { px, py } = placeOf(event);
-  look(Math.floor(px), Math.floor(py));
-};
-canvas.addEventListener("pointerup", release);
-canvas.addEventListener("pointercancel", release);
-
-canvas.addEventListener("wheel", (event) => {
-  event.preventDefault();
-  if (!image) return;
-  // Some systems scroll horizontally with Shift.
-  const turn = (event.deltaY || event.deltaX) * [1, 33, 400][event.deltaMode];
-  const { x, y } = placeOf(event);
-  if (event.shiftKey) showPlane(view.plane - Math.sign(turn));
-  else zoomBy(2 ** (-turn / 250), x, y);
-}, { passive: false });
-
-const step = () => 0.15 * Math.min(canvas.clientWidth, canvas.clientHeight);
 const [nearer, deeper, higher] = [() => zoomBy(Math.SQRT2), () => showPlane(view.plane - 1), () => showPlane(view.plane + 1)];
 const [previous, next] = [() => go(wanted - 1), () => go(wanted + 1)];
 const KEYS = {
@@ -284,7 +175,6 @@ element("plane").addEventListener("input", (event) => showPlane(Number(event.tar
 element("previous").addEventListener("click", previous);
 element("next").addEventListener("click", next);
 element("number").addEventListener("change", ({ target }) => go(Math.floor(Number(target.value) || 1) - 1));
-new ResizeObserver(redraw).observe(canvas);
 
 // Missing tiles may have been written since.
 addEventListener("focus", () => {

@@ -1,0 +1,371 @@
+"use strict";
+
+// The image of the recipe: requests, drawing, outlines, small fields.
+
+/** The shown image: description, grey levels, and a canvas with its pixels. */
+let shown = null;
+
+/** Position of the stage, µm; null for that of the recipe. */
+let focus = null;
+
+const layers = new Map();
+
+/** Splits a reply into its description and its samples. */
+function unframed(buffer) {
+  const length = new DataView(buffer).getUint32(0, true);
+  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  if (!head.width) return { head };
+  // A copy, because 16-bit samples must be aligned.
+  const raw = buffer.slice(4 + length);
+  return { head, raw, levels: head.bits <= 8 ? new Uint8Array(raw) : new Uint16Array(raw) };
+}
+
+async function requestImage(kind, index) {
+  const { recipe, seed } = state;
+  const [focus_um, noise_free] = [kind === "small" ? null : focus, element("noise-free").checked];
+  const body = { recipe, seed, index, view: kind, focus_um, noise_free };
+  return unframed(await (await request("render", body)).arrayBuffer());
+}
+
+/** Returns a canvas with the pixels of an image, 0 to the largest level as black to white. */
+function painted({ head, levels }) {
+  const { width, height, channels, bits } = head;
+  const own = new OffscreenCanvas(width, height);
+  const pixels = new ImageData(width, height);
+  const words = new Uint32Array(pixels.data.buffer);
+  const shift = Math.max(bits - 8, 0);
+  const alpha = 0xff000000;
+  if (channels === 1) {
+    for (let i = 0; i < words.length; i += 1) {
+      const level = levels[i] >> shift;
+      words[i] = alpha | (level << 16) | (level << 8) | level;
+    }
+  } else {
+    for (let i = 0, k = 0; i < words.length; i += 1, k += 3) {
+      words[i] = alpha | ((levels[k + 2] >> shift) << 16) | ((levels[k + 1] >> shift) << 8) | (levels[k] >> shift);
+    }
+  }
+  own.getContext("2d").putImageData(pixels, 0, 0);
+  return own;
+}
+
+// Rendering: the reduced image of the latest change first, then the image, then the small fields.
+
+let dirty = false;
+let running = false;
+/** Name of the last change, and the times of the images of each, ms: fast changes need no reduced image. */
+let lastName = null;
+const costs = new Map();
+
+/** Longest time of an image without a reduced one before it, ms; fraction of a time that stays with each image. */
+const [FAST_MS, STAYS] = [80, 0.9];
+
+function say(text) {
+  element("message").textContent = text;
+  element("message").hidden = !text;
+}
+
+const status = (text) => { element("status").textContent = text; };
+
+/** Least time of an image relative to its reduced image; time beyond which a smaller field is offered, ms. */
+const [FULL_FACTOR, SLOW_MS] = [3.5, 4000];
+
+/** Says how long the image takes, and offers a smaller field. */
+function offerSmaller(ms) {
+  const button = Object.assign(made("button", "Halve width and height"), { type: "button" });
+  button.addEventListener("click", () => {
+    const half = (side) => moved(side, Math.max(Math.round(centre(side) / 2), 16), [16, 32768]);
+    const { width_px, height_px } = state.recipe.field;
+    edit(["field"], { ...state.recipe.field, width_px: half(width_px), height_px: half(height_px) });
+  });
+  element("status").replaceChildren(`This field takes about ${Math.round(ms / 1000)} s.`, button);
+}
+
+/** Requests an image of the present state. `name` is that of the changed field. */
+function render(name = null) {
+  lastName = name;
+  dirty = true;
+  document.body.dataset.ready = false;
+  document.body.dataset.full = false;
+  if (!running) run();
+}
+
+async function run() {
+  running = true;
+  try {
+    while (dirty) {
+      dirty = false;
+      const isFast = lastName !== null && (costs.get(lastName) ?? Infinity) < FAST_MS;
+      if (!isFast && !(await renderKind("reduced"))) continue;
+      if (dirty) continue;
+      await renderKind("full");
+    }
+  } catch (error) {
+    say(error.status ? error.message : "The program does not respond. Start it again and reload the page.");
+  }
+  running = false;
+  if (!dirty) showStrip();
+}
+
+/** Requests and shows an image. Returns whether it is shown. */
+async function renderKind(kind) {
+  const reply = await requestImage(kind, state.index);
+  const { head } = reply;
+  if (head.cancelled) return false;
+  if (head.errors) {
+    if (!dirty) fail(head.errors);
+    return false;
+  }
+  say("");
+  showFaults([]);
+  if (kind === "full") costs.set(lastName, Math.max(head.ms, STAYS * (costs.get(lastName) ?? 0)));
+  show(reply);
+  if (kind === "reduced" && FULL_FACTOR * head.ms > SLOW_MS) offerSmaller(FULL_FACTOR * head.ms);
+  return true;
+}
+
+/** Shows errors of the recipe; the last image stays. */
+function fail(errors) {
+  showFaults(errors);
+  const [{ message }] = errors;
+  say(errors.length > 1 ? `${message} (and ${errors.length - 1} more)` : message);
+  status("The recipe has errors. The last image is shown.");
+  document.body.dataset.ready = true;
+}
+
+function show(reply) {
+  const { head } = reply;
+  shown = { ...reply, canvas: painted(reply) };
+  const [width, height] = [head.width * head.factor, head.height * head.factor];
+  const isOther = !image || Math.abs(image.width - width) >= 4 || Math.abs(image.height - height) >= 4;
+  if (head.factor === 1 || isOther) image = { width, height, pixel_um: head.pixel_um / head.factor };
+  if (isOther && !placed()) fit();
+  showFocus();
+  showFacts();
+  redraw();
+  if (head.factor > 1) return;
+  for (const name of layers.keys()) requestLabels(name);
+  document.body.dataset.full = true;
+  showReal();
+  hash();
+}
+
+// Outlines
+
+function addLayer(name) {
+  const check = Object.assign(document.createElement("input"), { type: "checkbox", id: `layer-${name}` });
+  check.addEventListener("change", () => setLayer(name, check.checked));
+  layers.set(name, { on: false, check, id: 0, bitmap: null });
+  element("groups").append(made("label", [check, ` ${title(name)}`], "check"));
+}
+
+function setLayer(name, on) {
+  Object.assign(layers.get(name), { on });
+  layers.get(name).check.checked = on;
+  if (!on) showLegend(shown?.head.id, element("by").value).catch(() => {});
+  requestLabels(name);
+  redraw();
+  keepPlace();
+}
+
+async function requestLabels(name) {
+  const layer = layers.get(name);
+  const id = shown?.head.id;
+  if (!layer.on || !id || shown.head.factor > 1 || layer.id === id) return;
+  layer.id = id;
+  try {
+    const by = element("by").value;
+    const bitmap = await createImageBitmap(await (await request(`labels/${id}/${by}/${name}.png`)).blob());
+    if (layer.id !== id) return;
+    Object.assign(layer, { bitmap, of: id });
+    redraw();
+    showLegend(id, by);
+  } catch (error) {
+    // Another image has replaced this one.
+    if (error.status !== 404) say(error.message);
+  }
+}
+
+/** Colours all outlines again. */
+function recolour() {
+  element("legend").replaceChildren();
+  for (const [name, layer] of layers) {
+    Object.assign(layer, { id: 0, of: 0 });
+    requestLabels(name);
+  }
+  redraw();
+  keepPlace();
+}
+
+/** Shows the meaning of the colours. */
+async function showLegend(id, by) {
+  if (by === "object") return;
+  const names = [...layers].filter(([, { on }]) => on).map(([name]) => name);
+  const found = await Promise.all(names.map(async (name) => (await request(`legend/${id}/${by}/${name}`)).json()));
+  if (by !== element("by").value) return;
+  const entries = new Map(found.flat().map(({ colour, text }) => [text, colour]));
+  element("legend").replaceChildren(...[...entries].map(([text, colour]) => {
+    const sample = made("i", []);
+    sample.style.background = colour;
+    return made("li", [sample, text]);
+  }));
+}
+
+// Drawing
+
+function draw() {
+  clearCanvas();
+  if (!shown) return;
+  const { head } = shown;
+  const [x0, y0] = [onScreenX(0), onScreenY(0)];
+  const [x1, y1] = [onScreenX(head.width * head.factor), onScreenY(head.height * head.factor)];
+  context.imageSmoothingEnabled = head.factor > 1 || view.zoom * devicePixelRatio < 1;
+  context.imageSmoothingQuality = "high";
+  context.drawImage(shown.canvas, x0, y0, x1 - x0, y1 - y0);
+  let isHere = head.factor === 1;
+  for (const { on, bitmap, of } of layers.values()) {
+    if (!on) continue;
+    if (bitmap && of === head.id) context.drawImage(bitmap, x0, y0, x1 - x0, y1 - y0);
+    else isHere = false;
+  }
+  drawReal(x1);
+  drawMark();
+  drawScale();
+  document.body.dataset.ready = isHere && !dirty && !running;
+  keepPlace();
+}
+
+/** Shows the objects at a pixel. */
+async function look(x, y) {
+  if (!shown || x < 0 || y < 0 || x >= image.width || y >= image.height) return;
+  mark = { x, y };
+  redraw();
+  element("here-at").textContent = `${x}, ${y} px`;
+  if (shown.head.factor > 1) return;
+  try {
+    const { objects } = await (await request(`at/${shown.head.id}/${x}/${y}`)).json();
+    if (mark?.x !== x || mark?.y !== y) return;
+    const plain = (node, values, unit) => { node.textContent = `${minus(values[0], 1)}${unit}`; };
+    const none = made("p", "No object here.", "quiet");
+    element("objects").replaceChildren(...(objects.length ? objects.map((object) => card(object, plain)) : [none]));
+  } catch (error) {
+    if (error.status !== 404) element("objects").replaceChildren(made("p", error.message, "quiet"));
+  }
+}
+
+/** Shows position and grey level of the pixel under the pointer. */
+function pointAt(x, y) {
+  const um = (px) => minus(px * image.pixel_um, 1);
+  let text = `${Math.floor(x)}, ${Math.floor(y)} px · ${um(x)}, ${um(y)} µm`;
+  const { head, levels } = shown ?? {};
+  const [column, row] = [Math.floor(x / head?.factor), Math.floor(y / head?.factor)];
+  if (levels && column >= 0 && row >= 0 && column < head.width && row < head.height) {
+    const first = (row * head.width + column) * head.channels;
+    text += ` · grey level ${[...levels.subarray(first, first + head.channels)].join(", ")}`;
+  }
+  element("position").textContent = text;
+}
+
+// Focus
+
+function setFocus(um, name = "focus") {
+  focus = um === null ? null : clamp(Math.round(um * 100) / 100, -200, 200);
+  showFocus();
+  render(name);
+  showOutput();
+  keepPlace();
+}
+
+const focusBy = (steps) => !shown?.head.fused && setFocus((focus ?? shown?.head.stage_um ?? 0) + 0.5 * steps);
+
+function showFocus() {
+  const { stage_um, planes_um, fused } = shown?.head ?? { stage_um: 0, planes_um: [0] };
+  const um = focus ?? stage_um;
+  const slider = element("focus");
+  const reach = Math.max(20, Math.abs(um), ...planes_um.map(Math.abs));
+  Object.assign(slider, { min: -reach, max: reach, disabled: Boolean(fused) });
+  slider.value = um;
+  const text = fused ? "fused planes" : `${minus(um, 1)} µm`;
+  element("focus-text").textContent = text;
+  slider.setAttribute("aria-valuetext", text);
+  element("focus-reset").disabled = focus === null;
+}
+
+// Small fields
+
+/** What the small fields show. */
+let stripOf = null;
+let stripRun = 0;
+
+/** Number of small fields, and the pause before they are made, ms. */
+const [STRIP, STRIP_MS] = [8, 350];
+
+async function showStrip() {
+  const own = (stripRun += 1);
+  const first = Math.floor(state.index / STRIP) * STRIP;
+  const isPresent = () => own === stripRun && !dirty && !running;
+  const buttons = [...element("strip").children];
+  buttons.forEach((button, k) => {
+    button.setAttribute("aria-pressed", first + k === state.index);
+    button.setAttribute("aria-label", `Field ${first + k}`);
+    button.title = `Field ${first + k}`;
+    button.lastChild.textContent = first + k;
+  });
+  const of = JSON.stringify([state.recipe, state.seed, first, element("noise-free").checked]);
+  if (of === stripOf) return;
+  await new Promise((resolve) => setTimeout(resolve, STRIP_MS));
+  for (let k = 0; k < STRIP; k += 1) {
+    if (!isPresent()) return;
+    const reply = await requestImage("small", first + k).catch(() => null);
+    if (!isPresent() || !reply?.levels) return;
+    const canvas = buttons[k].firstChild;
+    const { width, height } = reply.head;
+    Object.assign(canvas, { width, height });
+    canvas.getContext("2d").drawImage(painted(reply), 0, 0);
+  }
+  stripOf = of;
+  document.body.dataset.strip = of.length;
+}
+
+function makeStrip() {
+  for (let k = 0; k < STRIP; k += 1) {
+    const button = made("button", [document.createElement("canvas"), made("span", String(k))]);
+    button.type = "button";
+    button.addEventListener("click", () => go(Math.floor(state.index / STRIP) * STRIP + k));
+    element("strip").append(button);
+  }
+}
+
+// Facts
+
+function showFacts() {
+  const { head } = shown;
+  const um = [head.width, head.height].map((px) => px * head.pixel_um);
+  element("size").textContent = `${um.map((side) => side.toFixed(0)).join(" × ")} µm`;
+  if (head.factor > 1) return;
+  const { phantoms, planes, background } = head.made;
+  const again = phantoms ? `${phantoms} objects` : planes ? "light" : background ? "background" : "camera";
+  const rows = [
+    ["pixels", `${head.width} × ${head.height}`], ["objects", head.objects], ["cells in the field", head.cells],
+    ...(head.unplaced ? [["cells without room", head.unplaced]] : []),
+    ["pixel", `${Number(head.pixel_um.toPrecision(4))} µm`], ["bits", head.bits],
+    ["saturated", `${((100 * head.saturated_px) / (head.width * head.height)).toFixed(2)} %`],
+    ["computed again", again], ["time", `${head.ms.toFixed(0)} ms`],
+  ];
+  const cell = made("dd", "…", "hash");
+  cell.id = "hash";
+  const cells = rows.flatMap(([name, value]) => [made("dt", name), made("dd", String(value))]);
+  element("facts").replaceChildren(...cells, made("dt", "SHA-256"), cell);
+  status(`Field ${state.index} of seed ${state.seed}: ${head.objects} objects, ${head.ms.toFixed(0)} ms.`);
+}
+
+/** Shows the SHA-256 of the samples of the image. */
+async function hash() {
+  const { raw, head } = shown;
+  const bytes = new Uint8Array(await crypto.subtle.digest("SHA-256", raw));
+  if (shown?.head.id !== head.id) return;
+  const text = [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+  const cell = element("hash");
+  if (cell) Object.assign(cell, { textContent: `${text.slice(0, 12)}…`, title: text });
+  document.body.dataset.hash = text;
+}
