@@ -10,7 +10,7 @@ use crate::page::{Group, Page};
 
 /// Pages in the order of the navigation: path, part of the navigation, title and source. Formats, crates and sections
 /// of recipes follow in their parts.
-const PAGES: [(&str, Group, &str, &str); 19] = [
+const PAGES: [(&str, Group, &str, &str); 20] = [
     ("index.html", Group::Start, "papsynth", "site/pages/index.md"),
     ("start.html", Group::Start, "Start in five minutes", "site/pages/start.md"),
     ("overview.html", Group::Start, "Overview", "README.md"),
@@ -23,6 +23,7 @@ const PAGES: [(&str, Group, &str, &str); 19] = [
     ("how-to/slides.html", Group::HowTo, "Whole slides", "site/pages/how-to/slides.md"),
     ("properties/limits.html", Group::Properties, "Limits", "site/pages/limits.md"),
     ("properties/performance.html", Group::Properties, "Performance", "docs/PERFORMANCE.md"),
+    ("properties/worth.html", Group::Properties, "Worth for training", "docs/WORTH.md"),
     ("properties/reproducibility.html", Group::Properties, "Reproducibility", "docs/REPRODUCIBILITY.md"),
     ("properties/slides.html", Group::Properties, "Files of whole slides", "docs/SLIDES.md"),
     ("properties/clusters.html", Group::Properties, "Clusters", "docs/CLUSTERS.md"),

@@ -195,12 +195,19 @@ def dice(net, image, mask):
     return scores
 
 
+def use_bfloat16():
+    """Compute with bfloat16 on processors with instructions for it, which takes a third less time."""
+    processor = Path("/proc/cpuinfo")
+    if processor.exists() and {"avx512_bf16", "amx_bf16"} & set(processor.read_text().split()):
+        tf.keras.mixed_precision.set_global_policy("mixed_bfloat16")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--train", nargs="+", required=True)
     parser.add_argument("--test", type=Path, required=True)
     parser.add_argument("--mask", nargs=2, type=Path)
-    parser.add_argument("--steps", type=int, default=600)
+    parser.add_argument("--steps", type=int, default=3000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--weights", help="file to which the weights are written, .weights.h5")
     parser.add_argument("--out", type=Path, required=True)
@@ -208,6 +215,7 @@ def main():
     sets = [load(name) for name in options.train]
     if not all(sets) or any(min(image.shape) < SIDE for fields in sets for image, *_ in fields):
         parser.error(f"each training set needs at least one field, of at least {SIDE} pixels")
+    use_bfloat16()
     net = train(sets, options.steps, options.seed)
     result = {"train": options.train, "steps": options.steps, "seed": options.seed, "fields": []}
     for row in csv.DictReader((options.test / "frames.csv").open()):

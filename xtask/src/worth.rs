@@ -16,7 +16,11 @@ const PACKAGES: &str = "numpy\npillow\nscipy\n\
     tensorflow; sys_platform != 'linux' or platform_machine != 'x86_64'\n";
 
 /// Number of fields generated for each grade.
-const FRAMES: &str = "32";
+const FRAMES: &str = "40";
+
+/// Changes of the matched recipes: more objects that look like nuclei, and nuclei that differ more in darkness and
+/// texture than those of one slide (docs/WORTH.md).
+const FOR_TRAINING: [&str; 2] = ["debris.leukocytes.clusters.per_mm2.uniform=[10,120]", "stain.nucleus_variation=1"];
 
 /// Presets of the overlapping cells on which networks are trained: name and number of fields.
 const OVERLAP_TRAINING: [(&str, &str); 2] = [("lbc", "300"), ("dense", "80")];
@@ -29,8 +33,8 @@ const OVERLAP_TESTS: [(&str, &str); 2] = [("extended-focus", "60"), ("lsil", "40
 /// Needs PAPSYNTH_REFERENCE. `papsynth match` fits a recipe to every second real field of each grade; a U-Net is
 /// trained on fields of the three recipes, on those real fields, or on both, and finds the nuclei of the other half.
 /// Then the halves change places. Every training is written to target/worth, where an interrupted run continues; a
-/// table is printed. Delete target/worth after a change of papsynth. Each training takes about five minutes on 2
-/// cores; all of them take three hours.
+/// table is printed. Delete target/worth after a change of papsynth. Each training takes about ten minutes on 2
+/// cores; all of them take five hours. docs/WORTH.md tells what was measured.
 ///
 /// With --overlap: trains networks on complete masks of overlapping cells, and tests them on synthetic fields of other
 /// presets. Prints the Dice coefficients of found cells and the share of missed cells. Needs no real fields.
@@ -40,7 +44,7 @@ pub(crate) struct Worth {
     #[arg(long, value_name = "N", default_value_t = 3)]
     seeds: u32,
     /// Steps of a training
-    #[arg(long, value_name = "N", default_value = "600", default_value_if("overlap", "true", "1600"))]
+    #[arg(long, value_name = "N", default_value = "3000", default_value_if("overlap", "true", "1600"))]
     steps: u32,
     /// Outlines overlapping cells of synthetic fields instead
     #[arg(long, conflicts_with_all = ["widen", "other", "only"])]
@@ -177,7 +181,8 @@ fn synthetic(workspace: &Workspace, folder: &Path, real: &Path, half: usize, wid
         // With one seed for all, the grades would have the same scenes.
         let seed = (GRADES.len() * half + number).to_string();
         let words = ["--frames", FRAMES, "--seed", &seed, "--widen", widen, "--set", "slide.fields_per_slide=1"];
-        let words = words.into_iter().chain(["--without", "noise-free,layers,contact-sheet"]).map(PathBuf::from);
+        let words = words.into_iter().chain(["--without", "noise-free,layers,contact-sheet"]);
+        let words = words.chain(FOR_TRAINING.into_iter().flat_map(|set| ["--set", set])).map(PathBuf::from);
         dataset::generate(program(workspace), &partial.join(grade), [recipe].into_iter().chain(words))?;
     }
     std::fs::rename(&partial, &out).with_context(|| format!("cannot write {}", out.display()))?;

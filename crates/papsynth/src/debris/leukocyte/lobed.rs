@@ -148,9 +148,11 @@ pub(super) fn make(leukocyte: &Leukocyte, context: &ObjectContext<'_>) -> Phanto
         *cover = cover.max(*inside);
     }
     if let Ok(blur) = Gaussian::new(context.px(softness_um)) {
-        for tile in [&mut canvas.absorbance, &mut nucleus.absorbance] {
+        // The coverage as well, so that it is positive wherever the leukocyte absorbs.
+        for tile in [&mut canvas.absorbance, &mut canvas.coverage, &mut nucleus.absorbance] {
             tile.values = blur.blur(&tile.values, tile.width, Border::Zero);
         }
+        canvas.coverage.values.iter_mut().for_each(|cover| *cover = cover.min(1.0));
     }
     crop(&mut canvas, context, context.px(leukocyte.reach_um(context.pixel_um)));
     let mut phantom = canvas
