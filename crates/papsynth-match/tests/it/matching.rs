@@ -103,7 +103,8 @@ fn a_match_finds_the_parameters_and_does_not_depend_on_the_number_of_threads() {
     let blur = of(&one, Parameter::Blur);
     assert!(blur.fields[3] > 1.15 * blur.fields[0] && blur.spread > 0.08, "{blur:?}");
     let d = one.distance;
-    assert!(d.after < 0.7 * d.before, "{d:?}");
+    // Four small fields have few leukocytes, whose number a short match hardly finds.
+    assert!(d.after < 0.85 * d.before, "{d:?}");
     assert!(one.statistics.iter().any(|s| s.name == "log nuclei" && s.real.is_finite()));
 
     // The page compares the fields with simulated ones.
