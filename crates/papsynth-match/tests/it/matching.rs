@@ -53,7 +53,11 @@ fn fields_of(setting: &Setting, count: u64, from: NucleiFrom, apart: f64) -> Vec
 }
 
 fn small(pixel: PixelSize, rounds: usize) -> Match {
-    let params = MatchParams { pixel, simulations: 60, rounds, refine: 0, seed: 5 };
+    with_seed(pixel, rounds, 5)
+}
+
+fn with_seed(pixel: PixelSize, rounds: usize, seed: u64) -> Match {
+    let params = MatchParams { pixel, simulations: 60, rounds, refine: 0, seed };
     Match::new(&params, &Preset::Lbc.recipe()).unwrap()
 }
 
@@ -102,9 +106,10 @@ fn a_match_finds_the_parameters_and_does_not_depend_on_the_number_of_threads() {
     assert!((level.fields[3] - level.fields[0] - 0.03).abs() < 0.015, "{level:?}");
     let blur = of(&one, Parameter::Blur);
     assert!(blur.fields[3] > 1.15 * blur.fields[0] && blur.spread > 0.08, "{blur:?}");
-    let d = one.distance;
-    // Four small fields have few leukocytes, whose number a short match hardly finds.
-    assert!(d.after < 0.85 * d.before, "{d:?}");
+    // Four fields have few slides, so that the distance of one match depends on its draws: the ratio is 0.5 to 0.8.
+    let other = on_threads(2, &fields, &with_seed(PixelSize::Known(PIXEL_UM), 2, 6));
+    let [after, before] = [one.distance.after + other.distance.after, one.distance.before + other.distance.before];
+    assert!(after < 0.7 * before, "{:?} {:?}", one.distance, other.distance);
     assert!(one.statistics.iter().any(|s| s.name == "log nuclei" && s.real.is_finite()));
 
     // The page compares the fields with simulated ones.
