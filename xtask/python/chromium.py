@@ -164,6 +164,13 @@ class Browser:
             and "ERR_EMPTY_RESPONSE" not in e["params"]["entry"]["text"]
         ]
 
+    def check(self, *origins):
+        """Check that pages asked for nothing but addresses that begin so, or data of their own, without an error."""
+        urls = self.requests()
+        assert urls and all(url.startswith((*origins, "data:", "about:", "blob:")) for url in urls), urls
+        complaints = self.complaints()
+        assert not complaints, json.dumps(complaints)
+
     def close(self):
         self.session = None
         self.call("Browser.close")

@@ -6,7 +6,6 @@ FOLDER is emptied; screenshots go there.
 """
 
 import csv
-import json
 import shutil
 import sys
 from pathlib import Path
@@ -178,10 +177,7 @@ def main():
         check_planes(browser)
         check_labels(browser, min(nuclei, key=lambda row: -float(row["depth_um"])), folder)
         check_reload(browser)
-        urls = browser.requests()
-        assert urls and all(url.startswith((served.address, "data:", "about:")) for url in urls), urls
-        complaints = browser.complaints()
-        assert not complaints, json.dumps(complaints)
+        browser.check(served.address)
     finally:
         browser.close()
     code, _ = served.interrupt()

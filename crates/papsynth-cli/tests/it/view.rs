@@ -1,9 +1,10 @@
 //! `papsynth view`.
 
-#[allow(dead_code, reason = "each test uses a part")]
 use std::fs;
 
-use crate::support::{Bench, TINY};
+use crate::support::Bench;
+#[cfg(unix)]
+use crate::support::TINY;
 
 #[test]
 fn invalid_input_of_a_view_has_exit_code_2() {
@@ -28,27 +29,13 @@ fn invalid_input_of_a_view_has_exit_code_2() {
 #[cfg(unix)]
 #[test]
 fn the_server_runs_until_ctrl_c() {
-    use std::io::{BufRead, BufReader, Read, Write};
-    use std::net::TcpStream;
-    use std::process::Command;
-
     let bench = Bench::new("view-serves");
     bench.good(&format!("generate --out set --frames 2 {TINY}"));
-    let mut child = bench.spawn_piped("view set");
-    let mut out = BufReader::new(child.stdout.take().unwrap());
-    let mut text = String::new();
-    (0..2).for_each(|_| assert!(out.read_line(&mut text).unwrap() > 0));
-    let address = text.split_whitespace().find_map(|word| word.strip_prefix("http://127.0.0.1:")).unwrap();
-    let port: u16 = address.trim_end_matches('/').parse().unwrap();
-    let mut stream = TcpStream::connect(("127.0.0.1", port)).unwrap();
-    let request = format!("GET /info HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nConnection: close\r\n\r\n");
-    stream.write_all(request.as_bytes()).unwrap();
-    let mut answer = String::new();
-    stream.read_to_string(&mut answer).unwrap();
-    let info: serde_json::Value = serde_json::from_str(answer.split("\r\n\r\n").nth(1).unwrap()).unwrap();
+    let server = bench.serve("view set");
+    let info = server.get("/info");
     assert_eq!((&info["title"], &info["images"]), (&"set".into(), &2.into()), "{info}");
+    let port = server.port;
     let taken = bench.run(&format!("view set --port {port}"));
     assert!(taken.code == 2 && taken.err.contains(&format!("127.0.0.1:{port}")), "{}", taken.err);
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
-    assert_eq!(child.wait().unwrap().code(), Some(0));
+    assert_eq!(server.interrupt(), Some(0));
 }

@@ -91,6 +91,20 @@ impl Bench {
         self.command(words).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap()
     }
 
+    /// A run in the background that serves a page and prints its address.
+    #[cfg(unix)]
+    pub(crate) fn serve(&self, words: &str) -> Server {
+        use std::io::{BufRead, BufReader};
+        let mut child = self.spawn_piped(words);
+        let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+        let port = lines.find_map(|line| {
+            let line = line.unwrap();
+            let address = line.split_whitespace().find_map(|word| word.strip_prefix("http://127.0.0.1:"))?;
+            Some(address.trim_end_matches('/').parse().unwrap())
+        });
+        Server { child, port: port.unwrap() }
+    }
+
     /// A run that must succeed.
     pub(crate) fn good(&self, words: &str) -> Outcome {
         let outcome = self.run(words);
@@ -194,4 +208,32 @@ fn sine(angle: f64) -> f64 {
         sum += term;
     }
     sum
+}
+
+/// A run that serves a page.
+#[cfg(unix)]
+pub(crate) struct Server {
+    child: std::process::Child,
+    pub(crate) port: u16,
+}
+
+#[cfg(unix)]
+impl Server {
+    /// The JSON reply to a GET request.
+    pub(crate) fn get(&self, target: &str) -> serde_json::Value {
+        use std::io::{Read, Write};
+        let mut stream = std::net::TcpStream::connect(("127.0.0.1", self.port)).unwrap();
+        let request = format!("GET {target} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nConnection: close\r\n\r\n", self.port);
+        stream.write_all(request.as_bytes()).unwrap();
+        let mut reply = String::new();
+        stream.read_to_string(&mut reply).unwrap();
+        serde_json::from_str(reply.split("\r\n\r\n").nth(1).unwrap()).unwrap()
+    }
+
+    /// Ends the run like Ctrl-C and returns its exit code.
+    pub(crate) fn interrupt(mut self) -> Option<i32> {
+        let id = self.child.id().to_string();
+        assert!(std::process::Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+        self.child.wait().unwrap().code()
+    }
 }
