@@ -3,10 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use papsynth::white_level;
-use papsynth_judge::{
-    Detail, FieldImage, HISTOGRAM, HISTOGRAM_FROM, HISTOGRAM_STEP, Measurer, MeasurerParams, Statistics, describe,
-    frequencies,
-};
+use papsynth_judge::{Detail, FieldImage, Measurer, MeasurerParams, Statistics, describe, frequencies};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -81,10 +78,8 @@ fn report(ours: &Statistics, theirs: &Statistics, pixel_um: f64) -> Value {
             .then(|| json!({ "description": describe(name), "ours": ours, "theirs": theirs, "difference": difference }))
     };
     let scalars: Vec<Value> = ours.scalars().into_iter().zip(theirs.scalars()).filter_map(scalar).collect();
-    let bins: Vec<f64> = (0..HISTOGRAM).map(|i| HISTOGRAM_FROM + (i as f64 + 0.5) * HISTOGRAM_STEP).collect();
     json!({
         "scalars": scalars,
-        "absorbance": { "at": bins, "ours": ours.histogram, "theirs": theirs.histogram },
         "spectrum": {
             "at": frequencies().map(|frequency| pixel_um / frequency),
             "ours": ours.spectrum,

@@ -386,6 +386,7 @@ fn nuclei_of_leukocytes_have_the_measured_areas() {
         let area = quantile(&mut all, fraction);
         assert!((least..=most).contains(&area), "{fraction}: {area}");
     }
+    // Measured: 122 µm² with an absorbance above 0.045, which includes the blur of the lens.
     let cell = quantile(&mut whole_cells, 0.5);
     assert!((80.0..=130.0).contains(&cell), "{cell}");
 }
