@@ -29,11 +29,11 @@ section! {
     /// - absorbance 1 to 2 µm outside the outline 0.05, 0.09 and 0.22.
     ///
     /// The logarithm of the absorbance of the core has a standard deviation of 0.16 within and 0.24 between fields. The
-    /// slope of the edge is 0.14 to 0.20 of the contrast per pixel. The area with an absorbance above 0.045, cytoplasm
-    /// included, is 96, 122 and 156 µm² at 25 %, 50 % and 75 % of 35 isolated bodies of eight normal fields. The
-    /// fractions of degenerated and pyknotic leukocytes, and of those on cells, are estimates by eye. There are about
-    /// 45 leukocytes per mm². About two thirds of the clusters are single leukocytes; one to three in a hundred clusters
-    /// have more than 10. The centres of touching leukocytes are 5 to 10 µm apart.
+    /// slope of the edge is 0.14 to 0.20 of the contrast per pixel. The area with an absorbance above 0.045,
+    /// cytoplasm included, is 96, 122 and 156 µm² at 25 %, 50 % and 75 % of 35 isolated bodies of eight normal
+    /// fields. The fractions of degenerated and pyknotic leukocytes, and of those on cells, are estimates by eye.
+    /// There are about 45 leukocytes per mm². About two thirds of the clusters are single leukocytes; one to three in
+    /// a hundred clusters have more than 10. The centres of touching leukocytes are 5 to 10 µm apart.
     pub struct Leukocytes {
         /// Number of clusters; drawn once per field.
         clusters: Abundance = Abundance::per_mm2(Number::log_normal(27.0, 1.0)), 0..=100000, "per field or per mm²";
