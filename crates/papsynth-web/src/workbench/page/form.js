@@ -104,16 +104,20 @@ function fieldNode({ path, schema }, isLong) {
   });
   const help = made("p", [meaning, range ? made("span", ` ${range}`, "range") : ""], "help");
   help.id = `help-${(count += 1)}`;
+  const varies = made("p", "", "varies");
   const fault = made("p", "", "fault");
   fault.id = `fault-${count}`;
-  node.append(made("div", [text, editor.forms ?? "", reset], "head"), editor.node, help, fault);
+  node.append(made("div", [text, editor.forms ?? "", reset], "head"), editor.node, varies, help, fault);
   const update = () => {
     editor.update();
     const base = at(state.base, path);
-    const isChanged = base !== undefined && !equal(base, at(state.recipe, path));
+    const isChanged = base !== undefined && (!equal(base, at(state.recipe, path)) || conditionsAt(path).length > 0);
     node.classList.toggle("changed", isChanged || base === undefined);
     reset.hidden = !isChanged;
     if (isChanged) reset.title = `Reset to ${toml(base)}`;
+    const conditions = conditionsAt(path).length;
+    varies.hidden = conditions === 0;
+    varies.textContent = `Each of ${conditions} conditions has a value of its own; a change here replaces them.`;
     const message = faults.get(node.dataset.path);
     fault.textContent = message ?? "";
     fault.hidden = !message;
