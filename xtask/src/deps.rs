@@ -24,7 +24,7 @@ const ENGINE: &[&str] = &["papsynth"];
 
 /// Crates and their allowed dependencies within the workspace, including those of tests, from the bottom up. A new
 /// crate needs a line here and a reason in ARCHITECTURE.md.
-const RULES: [(&[&str], &[&[&str]]); 16] = [
+const RULES: [(&[&str], &[&[&str]]); 17] = [
     (NUMERICS, &[]),
     (TECHNIQUES, &[NUMERICS]),
     (ENGINE, &[NUMERICS, TECHNIQUES]),
@@ -39,6 +39,8 @@ const RULES: [(&[&str], &[&[&str]]); 16] = [
     (&["papsynth-calibrate"], &[NUMERICS, TECHNIQUES, ENGINE, &["papsynth-dataset"]]),
     // Shows files and a study; the engine defines the groups of objects.
     (&["papsynth-web"], &[ENGINE, &["papsynth-dataset", "papsynth-judge", "papsynth-study"]]),
+    // Passes requests of a page without a server to the workbench.
+    (&["papsynth-wasm"], &[ENGINE, &["papsynth-web"]]),
     // Simulates with the engine and measures with the judge.
     (&["papsynth-match"], &[NUMERICS, ENGINE, &["papsynth-judge", "dye-spectra"]]),
     // Translates errors of the techniques to options of `papsynth calibrate`.

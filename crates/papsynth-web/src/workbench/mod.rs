@@ -8,7 +8,9 @@ mod recipes;
 mod rendering;
 
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
+use papsynth::key::STREAM_VERSION;
 use papsynth::model::Model;
 use papsynth::recipe::{CameraPreset, Preset, Recipe};
 use papsynth::truth::Group;
@@ -59,6 +61,10 @@ pub struct WorkbenchParams {
     pub threads: Threads,
     /// Memory for images, bytes; `None` for no limit.
     pub max_memory: Option<u64>,
+    /// Time since any start, for the times that the page shows; no pixel depends on it.
+    pub clock: fn() -> Duration,
+    /// Images that the page already has from an earlier workbench: the numbers of images continue.
+    pub images_before: usize,
 }
 
 /// The workbench: replies to the requests of its page.
@@ -102,6 +108,7 @@ impl Workbench {
         let camera = |camera: CameraPreset| json!({ "name": camera.name(), "summary": camera.summary(), "camera": camera.camera() });
         Reply::json(&json!({
             "version": env!("CARGO_PKG_VERSION"),
+            "stream_version": STREAM_VERSION,
             "schema": Recipe::schema(),
             "presets": Preset::ALL.map(preset),
             "cameras": CameraPreset::ALL.map(camera),

@@ -1,7 +1,7 @@
 //! Images of the workbench: one at a time, the most recent request first.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::Duration;
 
 use papsynth::key::Key;
 use papsynth::live::{Cancellation, Live, LiveImage};
@@ -74,6 +74,7 @@ pub(super) struct Renderer {
     model: Model,
     threads: Threads,
     max_memory: Option<u64>,
+    clock: fn() -> Duration,
     /// The images in progress or waiting.
     pending: Mutex<Vec<Cancellation>>,
     sessions: Mutex<Sessions>,
@@ -84,7 +85,7 @@ pub(super) struct Renderer {
 /// A session for each kind of image, because each has its own pixels.
 struct Sessions {
     lives: [Live; ImageKind::ALL.len()],
-    /// Number of complete images.
+    /// Number of complete images; the id of the last one.
     count: usize,
 }
 
@@ -112,8 +113,9 @@ impl Renderer {
             model: params.model.clone(),
             threads: params.threads,
             max_memory: params.max_memory,
+            clock: params.clock,
             pending: Mutex::default(),
-            sessions: Mutex::new(Sessions { lives, count: 0 }),
+            sessions: Mutex::new(Sessions { lives, count: params.images_before }),
             shown: Mutex::default(),
         })
     }
@@ -147,11 +149,11 @@ impl Renderer {
         if cancellation.is_cancelled() {
             return header(&json!({ "cancelled": true }));
         }
-        let start = now();
+        let start = (self.clock)();
         match image(&mut sessions.lives[asked.view as usize], asked, self.threads, cancellation) {
             Ok((scene, planes_um, LiveImage { mut planes, made })) => {
                 let Some(plane) = planes.pop() else { return Reply::error(500, "the image has no plane") };
-                let ms = start.elapsed().as_secs_f64() * 1e3;
+                let ms = (self.clock)().saturating_sub(start).as_secs_f64() * 1e3;
                 sessions.count += 1;
                 let (id, bits) = (sessions.count, scene.camera.bits);
                 let head = json!({
@@ -170,6 +172,7 @@ impl Renderer {
                     "unplaced": scene.unplaced(),
                     "saturated_px": plane.saturated.area(),
                     "ms": ms,
+                    "sha256": (asked.view == ImageKind::Full).then(|| plane.sha256(bits)),
                     "made": { "phantoms": made.phantoms, "planes": made.planes, "background": made.background },
                 });
                 let reply = match asked.noise_free {
@@ -341,11 +344,6 @@ pub(super) fn framed(head: &Value, samples: &[u16], bits: u32) -> Reply {
         _ => body.extend(samples.iter().flat_map(|sample| sample.to_le_bytes())),
     }
     Reply::binary(body)
-}
-
-#[expect(clippy::disallowed_methods, reason = "the page shows how long an image takes; no pixel depends on it")]
-fn now() -> Instant {
-    Instant::now()
 }
 
 /// Locks a mutex, also after a panic in another request: one request must not stop the server.

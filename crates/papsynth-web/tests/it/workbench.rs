@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::thread;
+use std::time::Duration;
 
 use papsynth::key::Key;
 use papsynth::live::Live;
@@ -17,7 +18,10 @@ use crate::support::view::{Pixels, recipe};
 fn workbench(recipe: Recipe, max_memory: Option<u64>) -> Workbench {
     let (model, inputs) = (Model::builtin(), Inputs::default());
     let (preset, threads) = (Preset::Lbc, Threads::All);
-    Workbench::new(WorkbenchParams { recipe, preset, model, inputs, seed: 5, threads, max_memory }).unwrap()
+    let clock = || Duration::ZERO;
+    let params =
+        WorkbenchParams { recipe, preset, model, inputs, seed: 5, threads, max_memory, clock, images_before: 0 };
+    Workbench::new(params).unwrap()
 }
 
 /// Replies as the server does.

@@ -81,13 +81,16 @@ function offerSmaller(ms) {
   element("status").replaceChildren(`This field takes about ${Math.round(ms / 1000)} s.`, button);
 }
 
+/** Gives up outdated images; the server does so at the next request for an image. */
+let outdate = () => {};
+
 /** Requests an image of the present state. `name` is that of the changed field. */
 function render(name = null) {
   lastName = name;
   dirty = true;
   document.body.dataset.ready = false;
   document.body.dataset.full = false;
-  if (!running) run();
+  if (running) outdate(); else run();
 }
 
 async function run() {
@@ -147,7 +150,6 @@ function show(reply) {
   for (const name of layers.keys()) requestLabels(name);
   document.body.dataset.full = true;
   showReal();
-  hash();
 }
 
 // Outlines
@@ -297,6 +299,9 @@ function showFocus() {
 let stripOf = null;
 let stripRun = 0;
 
+/** Number of small fields that are made at the same time: the server makes one. */
+let parallel = 1;
+
 /** Number of small fields, and the pause before they are made, ms. */
 const [STRIP, STRIP_MS] = [8, 350];
 
@@ -314,15 +319,20 @@ async function showStrip() {
   const of = JSON.stringify([state.recipe, state.seed, first, element("noise-free").checked]);
   if (of === stripOf) return;
   await new Promise((resolve) => setTimeout(resolve, STRIP_MS));
-  for (let k = 0; k < STRIP; k += 1) {
-    if (!isPresent()) return;
-    const reply = await requestImage("small", first + k).catch(() => null);
-    if (!isPresent() || !reply?.levels) return;
-    const canvas = buttons[k].firstChild;
-    const { width, height } = reply.head;
-    Object.assign(canvas, { width, height });
-    canvas.getContext("2d").drawImage(painted(reply), 0, 0);
-  }
+  let next = 0;
+  const makeSome = async () => {
+    for (let k = next++; k < STRIP; k = next++) {
+      const reply = isPresent() ? await requestImage("small", first + k).catch(() => null) : null;
+      if (!isPresent() || !reply?.levels) return false;
+      const canvas = buttons[k].firstChild;
+      const { width, height } = reply.head;
+      Object.assign(canvas, { width, height });
+      canvas.getContext("2d").drawImage(painted(reply), 0, 0);
+    }
+    return true;
+  };
+  const parts = await Promise.all(Array.from({ length: parallel }, makeSome));
+  if (!parts.every(Boolean)) return;
   stripOf = of;
   document.body.dataset.strip = of.length;
 }
@@ -352,20 +362,8 @@ function showFacts() {
     ["saturated", `${((100 * head.saturated_px) / (head.width * head.height)).toFixed(2)} %`],
     ["computed again", again], ["time", `${head.ms.toFixed(0)} ms`],
   ];
-  const cell = made("dd", "…", "hash");
-  cell.id = "hash";
   const cells = rows.flatMap(([name, value]) => [made("dt", name), made("dd", String(value))]);
-  element("facts").replaceChildren(...cells, made("dt", "SHA-256"), cell);
+  element("facts").replaceChildren(...cells);
+  element("hash").textContent = document.body.dataset.hash = head.sha256;
   status(`Field ${state.index} of seed ${state.seed}: ${head.objects} objects, ${head.ms.toFixed(0)} ms.`);
-}
-
-/** Shows the SHA-256 of the samples of the image. */
-async function hash() {
-  const { raw, head } = shown;
-  const bytes = new Uint8Array(await crypto.subtle.digest("SHA-256", raw));
-  if (shown?.head.id !== head.id) return;
-  const text = [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
-  const cell = element("hash");
-  if (cell) Object.assign(cell, { textContent: `${text.slice(0, 12)}…`, title: text });
-  document.body.dataset.hash = text;
 }
