@@ -33,7 +33,7 @@ class Workbench(Browser):
 
     def hash(self):
         self.ready()
-        self.until("document.body.dataset.hash !== undefined && element('hash').title === document.body.dataset.hash")
+        self.until("document.body.dataset.hash !== undefined && element('hash').textContent === document.body.dataset.hash")
         return self.run("document.body.dataset.hash")
 
     def change(self, selector, value):

@@ -36,11 +36,7 @@ impl<'a> Grey<'a> {
 }
 
 /// Returns the statistics of both images. The image with smaller pixels is resampled, so that both have the same.
-pub(super) fn compared(
-    asked: &CompareRequest,
-    renderer: &Renderer,
-    real: &RealImage,
-) -> Result<Reply, Reply> {
+pub(super) fn compared(asked: &CompareRequest, renderer: &Renderer, real: &RealImage) -> Result<Reply, Reply> {
     let (ours, own_um) = renderer.with_grey(asked.id, |grey, pixel_um| (field_image(grey), pixel_um))?;
     let theirs = field_image(&Grey::of(real));
     let invalid = |error: papsynth_judge::Error| Reply::error(422, &error.to_string());

@@ -4,7 +4,7 @@ use std::panic::{self, AssertUnwindSafe};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread;
-use std::time::Instant;
+use std::time::Duration;
 
 use papsynth::model::Model;
 use papsynth::recipe::Recipe;
@@ -19,7 +19,7 @@ use serde_json::{Value, json};
 use super::WorkbenchParams;
 use super::compare::{Grey, channel, field_image};
 use super::real::{RealImage, RealImages};
-use super::rendering::{locked, now};
+use super::rendering::locked;
 use crate::server::Reply;
 
 /// A request for a match.
@@ -78,6 +78,7 @@ pub(super) struct Matching {
     model: Model,
     inputs: Inputs,
     threads: Threads,
+    clock: fn() -> Duration,
     /// Memory for simulated fields, bytes; `None` for no limit.
     max_memory: Option<u64>,
     last: Mutex<Arc<Run>>,
@@ -93,9 +94,9 @@ struct Task {
 
 impl Matching {
     pub(super) fn new(params: &WorkbenchParams, max_memory: Option<u64>) -> Self {
-        let WorkbenchParams { model, inputs, threads, .. } = params;
-        let (model, inputs) = (model.clone(), Inputs { profile: None, ..inputs.clone() });
-        Self { model, inputs, threads: *threads, max_memory, last: Mutex::default() }
+        let WorkbenchParams { threads, clock, .. } = *params;
+        let (model, inputs) = (params.model.clone(), params.inputs.clone());
+        Self { model, inputs, threads, clock, max_memory, last: Mutex::default() }
     }
 
     /// Begins a match, and stops the last one.
@@ -116,9 +117,10 @@ impl Matching {
             };
             *locked(&own.state) = state;
         };
-        thread::Builder::new().name("match".to_owned()).spawn(work).map_err(|error| {
-            Reply::error(500, &format!("cannot start a thread: {error}"))
-        })?;
+        thread::Builder::new()
+            .name("match".to_owned())
+            .spawn(work)
+            .map_err(|error| Reply::error(500, &format!("cannot start a thread: {error}")))?;
         Ok(Self::reply(&run))
     }
 
@@ -140,12 +142,7 @@ impl Matching {
 
     /// Returns the number of simulated fields and the estimated duration. `pace` is the time that a pixel of an image
     /// takes, s.
-    pub(super) fn estimate(
-        &self,
-        asked: &MatchRequest,
-        real: &Mutex<RealImages>,
-        pace: f64,
-    ) -> Result<Value, Reply> {
+    pub(super) fn estimate(&self, asked: &MatchRequest, real: &Mutex<RealImages>, pace: f64) -> Result<Value, Reply> {
         /// Duration of a simulated field relative to that of an image: it is also measured, and most have more cells.
         const FIELD: f64 = 1.9;
         let Task { matching, images, workers } = self.task(asked, real)?;
@@ -161,8 +158,7 @@ impl Matching {
     fn task(&self, asked: &MatchRequest, real: &Mutex<RealImages>) -> Result<Task, Reply> {
         let default = if asked.quick { MatchParams::quick() } else { MatchParams::default() };
         let params = MatchParams { pixel: PixelSize::Known(asked.pixel_um), ..default };
-        let matching = Match::new(&params, &asked.recipe)
-            .map_err(|error| Reply::error(422, &error.to_string()))?;
+        let matching = Match::new(&params, &asked.recipe).map_err(|error| Reply::error(422, &error.to_string()))?;
         let real = locked(real);
         let image = |NamedImage { id, name }: &NamedImage| Ok((name.clone(), real.get(*id)?));
         let images: Vec<(String, Arc<RealImage>)> = asked.images.iter().map(image).collect::<Result<_, Reply>>()?;
@@ -186,8 +182,11 @@ impl Matching {
     }
 
     fn run(&self, task: &Task, run: &Run) -> Result<Fit, Error> {
-        let start = now();
-        let report = |progress: Progress| report(run, start, progress);
+        let start = (self.clock)();
+        let report = |Progress { phase, done, total }: Progress| {
+            let seconds = (self.clock)().saturating_sub(start).as_secs_f64();
+            *locked(&run.state) = State::Running { phase: phase.to_owned(), done, total, seconds };
+        };
         let control = Control { stop: &run.stop, report: &report };
         let make = |recipe: &Recipe| Engine::new(recipe, &self.model, &self.inputs);
         let fields: Vec<FieldImage> = task.images.iter().map(|(name, real)| field(name, real)).collect();
@@ -196,11 +195,6 @@ impl Matching {
         let pool = pool.map_err(|error| Error::Engine(format!("cannot start threads: {error}")))?;
         pool.install(|| task.matching.run(&fields, &make, &control))
     }
-}
-
-fn report(run: &Run, start: Instant, Progress { phase, done, total }: Progress) {
-    let seconds = start.elapsed().as_secs_f64();
-    *locked(&run.state) = State::Running { phase: phase.to_owned(), done, total, seconds };
 }
 
 /// Returns an image as a field of a match.

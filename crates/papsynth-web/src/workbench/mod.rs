@@ -3,14 +3,16 @@
 mod colouring;
 #[cfg(feature = "judge")]
 mod compare;
-#[cfg(feature = "judge")]
+#[cfg(feature = "match")]
 mod matching;
 mod real;
 mod recipes;
 mod rendering;
 
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
+use papsynth::key::STREAM_VERSION;
 use papsynth::model::Model;
 use papsynth::recipe::{CameraPreset, Preset, Recipe};
 use papsynth::truth::Group;
@@ -49,7 +51,7 @@ const MAX_IMAGE: usize = 1 << 27;
 const REAL_MEMORY: f64 = 0.15;
 
 /// Fraction of the memory for the fields of a match.
-#[cfg(feature = "judge")]
+#[cfg(feature = "match")]
 const MATCH_MEMORY: f64 = 0.3;
 
 /// What a workbench starts with.
@@ -69,6 +71,10 @@ pub struct WorkbenchParams {
     pub threads: Threads,
     /// Memory for images, bytes; `None` for no limit.
     pub max_memory: Option<u64>,
+    /// Time since any start, for the times that the page shows; no pixel depends on it.
+    pub clock: fn() -> Duration,
+    /// Images that the page already has from an earlier workbench: the numbers of images continue.
+    pub images_before: usize,
 }
 
 /// The workbench: replies to the requests of its page.
@@ -77,7 +83,7 @@ pub struct Workbench {
     renderer: Arc<Renderer>,
     /// The images of the user.
     real: Arc<Mutex<RealImages>>,
-    #[cfg(feature = "judge")]
+    #[cfg(feature = "match")]
     matching: Arc<matching::Matching>,
 }
 
@@ -116,10 +122,10 @@ impl Workbench {
         };
         let renderer = Arc::new(Renderer::new(&params)?);
         let real = Arc::new(Mutex::new(RealImages::within(part(REAL_MEMORY))));
-        #[cfg(feature = "judge")]
+        #[cfg(feature = "match")]
         let matching = Arc::new(matching::Matching::new(&params, part(MATCH_MEMORY)));
         Ok(Self {
-            #[cfg(feature = "judge")]
+            #[cfg(feature = "match")]
             matching,
             params,
             renderer,
@@ -134,11 +140,13 @@ impl Workbench {
         let camera = |camera: CameraPreset| json!({ "name": camera.name(), "summary": camera.summary(), "camera": camera.camera() });
         Reply::json(&json!({
             "version": env!("CARGO_PKG_VERSION"),
+            "stream_version": STREAM_VERSION,
             "schema": Recipe::schema(),
             "presets": Preset::ALL.map(preset),
             "cameras": CameraPreset::ALL.map(camera),
             "classes": self.params.model.classes.keys().collect::<Vec<_>>(),
             "compares": cfg!(feature = "judge"),
+            "matches": cfg!(feature = "match"),
             "groups": Group::ALL.map(Group::name),
             "preset": self.params.preset.name(),
             "recipe": self.params.recipe,
@@ -159,24 +167,30 @@ impl Workbench {
                 let text = if commented { recipe.to_commented_toml() } else { recipe.to_toml() };
                 Ok(Reply::json(&json!({ "text": text })))
             }
+            ("POST", ["cancel"]) => {
+                self.renderer.cancel();
+                Ok(Reply::json(&json!({})))
+            }
             ("POST", ["real", "remove"]) => {
                 let RemoveRequest { id } = request.json()?;
                 locked(&self.real).remove(id);
                 Ok(Reply::json(&json!({})))
             }
-            #[cfg(feature = "judge")]
+            #[cfg(feature = "match")]
             ("GET", ["match"]) => Ok(self.matching.state()),
-            #[cfg(feature = "judge")]
+            #[cfg(feature = "match")]
             ("POST", ["match"]) => self.matching.start(&request.json_within(MAX_RECIPE)?, &self.real),
-            #[cfg(feature = "judge")]
+            #[cfg(feature = "match")]
             ("POST", ["match", "cancel"]) => Ok(self.matching.stop()),
-            #[cfg(feature = "judge")]
+            #[cfg(feature = "match")]
             ("POST", ["match", "estimate"]) => {
                 let asked = request.json_within(MAX_RECIPE)?;
                 Ok(Reply::json(&self.matching.estimate(&asked, &self.real, self.renderer.pace())?))
             }
             (_, ["info" | "at" | "labels" | "legend" | "image.png" | "mask", ..]) => Err(Reply::wrong_method("GET")),
-            (_, ["check" | "compare" | "match" | "print" | "real" | "render", ..]) => Err(Reply::wrong_method("POST")),
+            (_, ["cancel" | "check" | "compare" | "match" | "print" | "real" | "render", ..]) => {
+                Err(Reply::wrong_method("POST"))
+            }
             _ => Err(Reply::error(404, "not found")),
         }
     }

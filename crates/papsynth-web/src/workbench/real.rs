@@ -47,7 +47,12 @@ impl RealImages {
     pub(super) fn add(&mut self, image: RealImage) -> Result<Reply, Reply> {
         if let Some(most) = self.max_bytes.filter(|most| self.bytes() > *most) {
             let most = format_bytes(most as f64);
-            return Err(Reply::error(413, &format!("the images need more than {most}; remove images, or start the program with a larger --max-memory")));
+            return Err(Reply::error(
+                413,
+                &format!(
+                    "the images need more than {most}; remove images, or start the program with a larger --max-memory"
+                ),
+            ));
         }
         self.last += 1;
         let reply = image.reply(self.last);
@@ -97,7 +102,7 @@ impl RealImage {
     }
 
     /// Returns width and height.
-    #[cfg(feature = "judge")]
+    #[cfg(feature = "match")]
     pub(super) fn size(&self) -> [usize; 2] {
         [self.image.width, self.image.height()]
     }

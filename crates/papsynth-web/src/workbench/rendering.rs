@@ -1,7 +1,7 @@
 //! Images of the workbench: one at a time, the most recent request first.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::Duration;
 
 use papsynth::key::Key;
 use papsynth::live::{Cancellation, Live, LiveImage};
@@ -76,6 +76,7 @@ pub(super) struct Renderer {
     model: Model,
     threads: Threads,
     max_memory: Option<u64>,
+    clock: fn() -> Duration,
     /// The images in progress or waiting.
     pending: Mutex<Vec<Cancellation>>,
     sessions: Mutex<Sessions>,
@@ -88,7 +89,7 @@ pub(super) struct Renderer {
 /// A session for each kind of image, because each has its own pixels.
 struct Sessions {
     lives: [Live; ImageKind::ALL.len()],
-    /// Number of complete images.
+    /// Number of complete images; the id of the last one.
     count: usize,
 }
 
@@ -116,22 +117,27 @@ impl Renderer {
             model: params.model.clone(),
             threads: params.threads,
             max_memory: params.max_memory,
+            clock: params.clock,
             pending: Mutex::default(),
-            sessions: Mutex::new(Sessions { lives, count: 0 }),
+            sessions: Mutex::new(Sessions { lives, count: params.images_before }),
             shown: Mutex::default(),
             pace: Mutex::default(),
         })
     }
 
+    /// Cancels all images in progress.
+    pub(super) fn cancel(&self) {
+        locked(&self.pending).drain(..).for_each(|earlier| earlier.cancel());
+    }
+
     /// Cancels the images that a new image replaces, and returns the flag of the new one.
     pub(super) fn begin(&self, asked: &RenderRequest) -> Cancellation {
-        let mut pending = locked(&self.pending);
         // Small images wait for the others; a change cancels all.
         if asked.view != ImageKind::Small {
-            pending.drain(..).for_each(|earlier| earlier.cancel());
+            self.cancel();
         }
         let cancellation = Cancellation::default();
-        pending.push(cancellation.clone());
+        locked(&self.pending).push(cancellation.clone());
         cancellation
     }
 
@@ -152,11 +158,11 @@ impl Renderer {
         if cancellation.is_cancelled() {
             return header(&json!({ "cancelled": true }));
         }
-        let start = now();
+        let start = (self.clock)();
         match image(&mut sessions.lives[asked.view as usize], asked, self.threads, cancellation) {
             Ok((scene, planes_um, LiveImage { mut planes, made })) => {
                 let Some(plane) = planes.pop() else { return Reply::error(500, "the image has no plane") };
-                let seconds = start.elapsed().as_secs_f64();
+                let seconds = (self.clock)().saturating_sub(start).as_secs_f64();
                 if made.phantoms == scene.objects.len() {
                     *locked(&self.pace) = seconds / (scene.view.width * scene.view.height) as f64;
                 }
@@ -178,6 +184,7 @@ impl Renderer {
                     "unplaced": scene.unplaced(),
                     "saturated_px": plane.saturated.area(),
                     "ms": seconds * 1e3,
+                    "sha256": (asked.view == ImageKind::Full).then(|| plane.sha256(bits)),
                     "made": { "phantoms": made.phantoms, "planes": made.planes, "background": made.background },
                 });
                 let reply = match asked.noise_free {
@@ -200,7 +207,7 @@ impl Renderer {
     }
 
     /// Returns the time of a pixel of the last image of which nothing was kept, s.
-    #[cfg(feature = "judge")]
+    #[cfg(feature = "match")]
     pub(super) fn pace(&self) -> f64 {
         *locked(&self.pace)
     }
@@ -351,11 +358,6 @@ pub(super) fn framed(head: &Value, samples: &[u16], bits: u32) -> Reply {
         _ => body.extend(samples.iter().flat_map(|sample| sample.to_le_bytes())),
     }
     Reply::binary(body)
-}
-
-#[expect(clippy::disallowed_methods, reason = "the page shows how long an image takes; no pixel depends on it")]
-pub(super) fn now() -> Instant {
-    Instant::now()
 }
 
 /// Locks a mutex, also after a panic in another request: one request must not stop the server.

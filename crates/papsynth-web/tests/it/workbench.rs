@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::thread;
+use std::time::Duration;
 
 use papsynth::key::Key;
 use papsynth::live::Live;
@@ -17,7 +18,10 @@ use crate::support::view::{Pixels, recipe};
 fn workbench(recipe: Recipe, max_memory: Option<u64>) -> Workbench {
     let (model, inputs) = (Model::builtin(), Inputs::default());
     let (preset, threads) = (Preset::Lbc, Threads::All);
-    Workbench::new(WorkbenchParams { recipe, preset, model, inputs, seed: 5, threads, max_memory }).unwrap()
+    let clock = || Duration::ZERO;
+    let params =
+        WorkbenchParams { recipe, preset, model, inputs, seed: 5, threads, max_memory, clock, images_before: 0 };
+    Workbench::new(params).unwrap()
 }
 
 /// Replies as the server does.
@@ -137,6 +141,9 @@ fn a_new_image_cancels_the_earlier_ones() {
     let threads = works.map(|work| thread::spawn(move || unframed(&work()).0["cancelled"] == true));
     let cancelled = threads.map(|thread| thread.join().unwrap());
     assert_eq!(cancelled, [true, true, true, false, false]);
+    let work = begin("full");
+    post(&mut workbench, "/cancel", &json!({}));
+    assert_eq!(unframed(&work()).0["cancelled"], true);
 }
 
 #[test]
@@ -185,7 +192,8 @@ fn images_of_the_user_are_decoded_in_memory() {
     #[cfg(feature = "judge")]
     {
         // An image does not differ from itself.
-        let found = json_of(&post(&mut workbench, "/compare", &json!({ "id": head["id"], "real": 1, "pixel_um": 0.25 })));
+        let found =
+            json_of(&post(&mut workbench, "/compare", &json!({ "id": head["id"], "real": 1, "pixel_um": 0.25 })));
         let scalars = found["scalars"].as_array().unwrap();
         assert!(scalars.len() > 5 && scalars.iter().all(|scalar| scalar["difference"] == 0.0), "{found}");
         assert_eq!(found["spectrum"]["ours"], found["spectrum"]["theirs"]);
@@ -207,7 +215,7 @@ fn images_of_the_user_are_decoded_in_memory() {
 }
 
 /// Waits for the end of the match, and returns the last reply.
-#[cfg(feature = "judge")]
+#[cfg(feature = "match")]
 fn ended(workbench: &mut Workbench) -> Value {
     loop {
         let state = json_of(&get(workbench, "/match"));
@@ -219,7 +227,7 @@ fn ended(workbench: &mut Workbench) -> Value {
     }
 }
 
-#[cfg(feature = "judge")]
+#[cfg(feature = "match")]
 #[test]
 fn a_match_finds_a_recipe_for_the_images_of_the_user() {
     let mut recipe = recipe("[slide]\nfields_per_slide = 1\n[background]\nlevel = 0.8\ntexture = 0.004\n");
@@ -247,7 +255,10 @@ fn a_match_finds_a_recipe_for_the_images_of_the_user() {
     // Errors of the match are those of the library.
     post(&mut workbench, "/match", &request(&[2], true));
     let failed = ended(&mut workbench);
-    assert_eq!((&failed["state"], failed["error"].as_str().unwrap().starts_with("1 field for a match")), (&json!("failed"), true));
+    assert_eq!(
+        (&failed["state"], failed["error"].as_str().unwrap().starts_with("1 field for a match")),
+        (&json!("failed"), true)
+    );
     assert_eq!(post(&mut workbench, "/match", &request(&[9], true)).status, 404);
     let mut wrong = request(&[1, 2], true);
     wrong["pixel_um"] = 99.0.into();

@@ -19,7 +19,9 @@ const matchRequest = () => ({
 
 /** Says how long a match to the images takes. */
 async function planMatch() {
-  if (!info.compares || reals.length === 0) return;
+  if (reals.length === 0) return;
+  element("match").hidden = !info.matches;
+  if (!info.matches) return;
   element("match-start").disabled = matching || reals.length < LEAST_REALS;
   if (reals.length < LEAST_REALS) {
     element("match-plan").textContent = `Add ${LEAST_REALS} or more images of one size to find the recipe whose fields resemble them.`;

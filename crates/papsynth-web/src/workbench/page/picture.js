@@ -109,6 +109,16 @@ function offerSmaller(ms, seconds) {
   node.children[1].textContent = ` ${seconds.toFixed(0)} s so far.`;
 }
 
+/** Gives up outdated images. */
+let outdate = () => request("cancel", {}).catch(() => {});
+
+/** The image in progress: whether it is the first one of a change, and its start. */
+let present = { isFirst: true, start: 0 };
+
+/** Time after which the first image of an outdated change is given up, too, ms: less would leave none while a slider
+ * moves. */
+const FIRST_PATIENCE_MS = 200;
+
 /** Requests an image of the present state. `name` is that of the changed field. */
 function render(name = null) {
   lastName = name;
@@ -116,6 +126,7 @@ function render(name = null) {
   document.body.dataset.ready = false;
   document.body.dataset.full = false;
   if (!running) run();
+  else if (!present.isFirst || performance.now() - present.start > FIRST_PATIENCE_MS) outdate();
 }
 
 async function run() {
@@ -128,6 +139,7 @@ async function run() {
       const first = KINDS.findLast((kind) => expected(kind) < FIRST_MS) ?? "coarse";
       for (const kind of KINDS.slice(KINDS.indexOf(first))) {
         if (kind === "reduced" && kind !== first && expected("full") < ALONE_MS) continue;
+        present = { isFirst: kind === first, start: performance.now() };
         if (dirty || !(await renderKind(kind))) break;
       }
     }
@@ -140,7 +152,7 @@ async function run() {
 
 /** Requests and shows an image. Returns whether it is shown. */
 async function renderKind(kind) {
-  const start = performance.now();
+  const { start } = present;
   const [name, ms] = [lastName, expected("full")];
   const wait = () => offerSmaller(ms, (performance.now() - start) / 1000);
   const waiting = ms > SLOW_MS ? setInterval(wait, WAIT_MS) : 0;
@@ -183,7 +195,6 @@ function show(reply) {
   for (const name of layers.keys()) requestLabels(name);
   document.body.dataset.full = true;
   showReal();
-  hash();
 }
 
 // Outlines
@@ -333,6 +344,9 @@ function showFocus() {
 let stripOf = null;
 let stripRun = 0;
 
+/** Number of small fields that are made at the same time: the server makes one. */
+let parallel = 1;
+
 /** Number of small fields, and the pause before they are made, ms. */
 const [STRIP, STRIP_MS] = [8, 350];
 
@@ -350,15 +364,20 @@ async function showStrip() {
   const of = JSON.stringify([state.recipe, state.seed, first, element("noise-free").checked]);
   if (of === stripOf) return;
   await new Promise((resolve) => setTimeout(resolve, STRIP_MS));
-  for (let k = 0; k < STRIP; k += 1) {
-    if (!isPresent()) return;
-    const reply = await requestImage("small", first + k).catch(() => null);
-    if (!isPresent() || !reply?.levels) return;
-    const canvas = buttons[k].firstChild;
-    const { width, height } = reply.head;
-    Object.assign(canvas, { width, height });
-    canvas.getContext("2d").drawImage(painted(reply), 0, 0);
-  }
+  let next = 0;
+  const makeSome = async () => {
+    for (let k = next++; k < STRIP; k = next++) {
+      const reply = isPresent() ? await requestImage("small", first + k).catch(() => null) : null;
+      if (!isPresent() || !reply?.levels) return false;
+      const canvas = buttons[k].firstChild;
+      const { width, height } = reply.head;
+      Object.assign(canvas, { width, height });
+      canvas.getContext("2d").drawImage(painted(reply), 0, 0);
+    }
+    return true;
+  };
+  const parts = await Promise.all(Array.from({ length: parallel }, makeSome));
+  if (!parts.every(Boolean)) return;
   stripOf = of;
   document.body.dataset.strip = of.length;
 }
@@ -388,20 +407,8 @@ function showFacts() {
     ["saturated", `${((100 * head.saturated_px) / (head.width * head.height)).toFixed(2)} %`],
     ["computed again", again], ["time", `${head.ms.toFixed(0)} ms`],
   ];
-  const cell = made("dd", "…", "hash");
-  cell.id = "hash";
   const cells = rows.flatMap(([name, value]) => [made("dt", name), made("dd", String(value))]);
-  element("facts").replaceChildren(...cells, made("dt", "SHA-256"), cell);
+  element("facts").replaceChildren(...cells);
+  element("hash").textContent = document.body.dataset.hash = head.sha256;
   status(`Field ${state.index} of seed ${state.seed}: ${head.objects} objects, ${head.ms.toFixed(0)} ms.`);
-}
-
-/** Shows the SHA-256 of the samples of the image. */
-async function hash() {
-  const { raw, head } = shown;
-  const bytes = new Uint8Array(await crypto.subtle.digest("SHA-256", raw));
-  if (shown?.head.id !== head.id) return;
-  const text = [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
-  const cell = element("hash");
-  if (cell) Object.assign(cell, { textContent: `${text.slice(0, 12)}…`, title: text });
-  document.body.dataset.hash = text;
 }

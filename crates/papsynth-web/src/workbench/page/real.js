@@ -12,7 +12,7 @@ async function useReal(file) {
   if (!file) return;
   try {
     const headers = { "Content-Type": "application/octet-stream" };
-    const response = await fetch("real", { method: "POST", body: file, headers });
+    const response = await send("real", { method: "POST", body: file, headers });
     if (!response.ok) throw new Error((await response.json()).error);
     const reply = unframed(await response.arrayBuffer());
     reals.push({ ...reply, canvas: painted(reply), name: file.name });

@@ -136,15 +136,17 @@ function settings() {
   return differences(state.base, recipe);
 }
 
-/** Returns the command that writes the field. */
-function commandLine() {
-  const words = ["papsynth generate", `--preset ${state.preset}`];
-  for (const [path, value] of settings()) {
-    words.push(`--set ${quoted(`${dotted(path)}=${toml(value)}`)}`);
-  }
-  words.push(`--seed ${state.seed}`, `--range ${state.index}..${state.index + 1}`, "--out field");
-  return words.join(" \\\n  ");
+/** Returns a command for the field, with further options. */
+function command(verb, ...options) {
+  const sets = settings().map(([path, value]) => `--set ${quoted(`${dotted(path)}=${toml(value)}`)}`);
+  return [`papsynth ${verb}`, `--preset ${state.preset}`, ...sets, `--seed ${state.seed}`, ...options].join(" \\\n  ");
 }
+
+/** Returns the command that writes the field. */
+const commandLine = () => command("generate", `--range ${state.index}..${state.index + 1}`, "--out field");
+
+/** Returns the command that prints the SHA-256 of the grey levels. */
+const checkLine = () => command("preview", `--index ${state.index}`);
 
 /** Returns a value in Python. */
 function python(value) {
