@@ -168,9 +168,12 @@ impl Matching {
             (recipe.field.width_px, recipe.field.height_px) = (width.into(), height.into());
             recipe.field.pixel_um = asked.pixel_um.into();
         }
+        // The fields as real numbers, and their samples.
+        let fields = images.iter().map(|(_, real)| 8 * real.image.levels.len() as u64).sum();
+        let left = self.max_memory.map(|most| most.saturating_sub(fields));
         let estimate = MemoryEstimate::of(&recipe, &Layout::default());
-        let plan = estimate.plan(self.threads(), false, self.max_memory);
-        let too_large = || Reply::error(422, &estimate.too_large(&recipe, self.max_memory.unwrap_or_default()));
+        let plan = estimate.plan(self.threads(), false, left);
+        let too_large = || Reply::error(422, &estimate.too_large(&recipe, left.unwrap_or_default()));
         Ok(Task { matching, images, workers: plan.ok_or_else(too_large)?.workers })
     }
 

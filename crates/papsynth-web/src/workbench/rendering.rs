@@ -82,7 +82,7 @@ pub(super) struct Renderer {
     sessions: Mutex<Sessions>,
     /// The last complete image.
     shown: Mutex<Option<Shown>>,
-    /// Time of a pixel of the last image of which nothing was kept, s.
+    /// Time of a pixel of the last image of full resolution of which nothing was kept, s.
     pace: Mutex<f64>,
 }
 
@@ -163,7 +163,7 @@ impl Renderer {
             Ok((scene, planes_um, LiveImage { mut planes, made })) => {
                 let Some(plane) = planes.pop() else { return Reply::error(500, "the image has no plane") };
                 let seconds = (self.clock)().saturating_sub(start).as_secs_f64();
-                if made.phantoms == scene.objects.len() {
+                if asked.view == ImageKind::Full && made.phantoms == scene.objects.len() {
                     *locked(&self.pace) = seconds / (scene.view.width * scene.view.height) as f64;
                 }
                 sessions.count += 1;
@@ -206,7 +206,7 @@ impl Renderer {
         }
     }
 
-    /// Returns the time of a pixel of the last image of which nothing was kept, s.
+    /// Returns the time of a pixel of the last image of full resolution of which nothing was kept, s.
     #[cfg(feature = "match")]
     pub(super) fn pace(&self) -> f64 {
         *locked(&self.pace)

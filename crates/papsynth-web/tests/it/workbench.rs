@@ -1,6 +1,7 @@
 //! The workbench without a browser: its replies, and its pixels against those of an engine.
 
 use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
@@ -18,10 +19,15 @@ use crate::support::view::{Pixels, recipe};
 fn workbench(recipe: Recipe, max_memory: Option<u64>) -> Workbench {
     let (model, inputs) = (Model::builtin(), Inputs::default());
     let (preset, threads) = (Preset::Lbc, Threads::All);
-    let clock = || Duration::ZERO;
     let params =
         WorkbenchParams { recipe, preset, model, inputs, seed: 5, threads, max_memory, clock, images_before: 0 };
     Workbench::new(params).unwrap()
+}
+
+/// A millisecond later at each call.
+fn clock() -> Duration {
+    static CALLS: AtomicU64 = AtomicU64::new(0);
+    Duration::from_millis(CALLS.fetch_add(1, Ordering::Relaxed))
 }
 
 /// Replies as the server does.
@@ -223,7 +229,7 @@ fn ended(workbench: &mut Workbench) -> Value {
             return state;
         }
         assert!(state["done"].as_u64() <= state["total"].as_u64(), "{state}");
-        thread::sleep(std::time::Duration::from_millis(20));
+        thread::sleep(Duration::from_millis(20));
     }
 }
 

@@ -65,12 +65,15 @@ async function followMatch() {
 }
 
 function showMatching(on, text, part = 0) {
+  const hasFocus = element("match").contains(document.activeElement);
   matching = on;
   element("match-progress").hidden = element("match-cancel").hidden = !on;
   element("match-progress").value = part;
   element("match-start").hidden = on;
   element("match-status").textContent = text;
   element("match-start").disabled = reals.length < LEAST_REALS;
+  // The button with the focus may be hidden now.
+  if (hasFocus && document.activeElement === document.body) element(on ? "match-cancel" : "match-start").focus();
 }
 
 /** Replaces the recipe by the matched one, and lists what changed. */
