@@ -69,7 +69,7 @@ fn picture(input: &Input, work: &Path, name: &str, words: &[&str]) -> Result<Str
 }
 
 /// Returns width and height of a PNG image.
-fn size(bytes: &[u8]) -> Option<[u32; 2]> {
+pub(crate) fn size(bytes: &[u8]) -> Option<[u32; 2]> {
     let number = |at: usize| Some(u32::from_be_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
     bytes.starts_with(b"\x89PNG").then(|| Some([number(16)?, number(20)?]))?
 }

@@ -1,7 +1,7 @@
 //! Generates the documentation site: plain files that need no server.
 //!
-//! `papsynth-site ROOT PROGRAM OUT [--no-pictures]` reads the pages of the repository in ROOT, asks the program for the
-//! schema and the presets, and replaces the folder OUT. Links and anchors within the site are checked.
+//! `papsynth-site ROOT PROGRAM ENGINE OUT [--no-pictures]` reads the pages of the repository in ROOT, asks the program for the
+//! schema and the presets, and replaces the folder OUT. ENGINE is the engine in WebAssembly. Links and anchors within the site are checked.
 
 #![forbid(unsafe_code)]
 #![expect(clippy::print_stdout, reason = "a command line program")]
@@ -13,6 +13,7 @@ mod markdown;
 mod page;
 mod reference;
 mod sources;
+mod workbench;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -29,6 +30,8 @@ pub(crate) struct Input {
     pub(crate) root: PathBuf,
     /// The program `papsynth`.
     program: PathBuf,
+    /// The engine in WebAssembly.
+    pub(crate) engine: PathBuf,
     /// Folder to write.
     pub(crate) out: PathBuf,
     /// Whether the pictures of the gallery are rendered.
@@ -45,12 +48,14 @@ pub(crate) enum Pictures {
 impl Input {
     fn from_arguments() -> Result<Self> {
         let words: Vec<String> = std::env::args().skip(1).collect();
-        let (root, program, out, pictures) = match words.as_slice() {
-            [root, program, out] => (root, program, out, Pictures::Rendered),
-            [root, program, out, option] if option == "--no-pictures" => (root, program, out, Pictures::LeftOut),
-            _ => bail!("expected ROOT PROGRAM OUT [--no-pictures]; `cargo xtask site` gives these arguments"),
+        let (paths, pictures) = match words.split_last() {
+            Some((option, paths)) if option == "--no-pictures" => (paths, Pictures::LeftOut),
+            _ => (&words[..], Pictures::Rendered),
         };
-        Ok(Self { root: root.into(), program: program.into(), out: out.into(), pictures })
+        let [root, program, engine, out] = paths else {
+            bail!("expected ROOT PROGRAM ENGINE OUT [--no-pictures]; `cargo xtask site` gives these arguments")
+        };
+        Ok(Self { root: root.into(), program: program.into(), engine: engine.into(), out: out.into(), pictures })
     }
 
     /// Reads a file of the repository.
@@ -96,6 +101,7 @@ fn build(input: &Input) -> Result<()> {
     write(&input.out.join("style.css"), include_str!("style.css"))?;
     write(&input.out.join("site.js"), include_str!("site.js"))?;
     write(&input.out.join("search.js"), layout::search(&pages)?)?;
+    workbench::write_page(input)?;
     let count = links::check(input, &pages)?;
     println!("{} pages; {count} links and anchors within the site are valid", pages.len());
     println!("open {}", input.out.join("index.html").display());

@@ -106,7 +106,7 @@ class Browser:
         raise SystemExit(f"waited for {condition}; {otherwise()}")
 
     def press(self, key):
-        codes = {" ": ("Space", 32), "ArrowLeft": ("ArrowLeft", 37), "ArrowRight": ("ArrowRight", 39)}
+        codes = {" ": ("Space", 32), "Tab": ("Tab", 9), "ArrowLeft": ("ArrowLeft", 37), "ArrowRight": ("ArrowRight", 39)}
         code, number = codes.get(key, (f"Key{key.upper()}", ord(key.upper()[0])))
         fields = {"key": key, "code": code, "windowsVirtualKeyCode": number}
         text = {"text": key} if len(key) == 1 else {}
@@ -114,7 +114,9 @@ class Browser:
         self.call("Input.dispatchKeyEvent", type="keyUp", **fields)
 
     def click(self, selector):
-        box = self.run(f"(r => [r.x + r.width / 2, r.y + r.height / 2])(document.querySelector('{selector}').getBoundingClientRect())")
+        node = f"document.querySelector('{selector}')"
+        self.run(f"{node}.scrollIntoView({{ block: 'nearest' }})")
+        box = self.run(f"(r => [r.x + r.width / 2, r.y + r.height / 2])({node}.getBoundingClientRect())")
         for kind in ("mousePressed", "mouseReleased"):
             self.call("Input.dispatchMouseEvent", type=kind, x=box[0], y=box[1], button="left", clickCount=1)
 
