@@ -70,8 +70,8 @@ class Instance {
   }
 
   /** Gives up an image that takes long, and what waits for it. */
-  giveUp() {
-    const isSlow = ({ head, since }) => head.target === "/render" && performance.now() - since > PATIENCE_MS;
+  giveUp(patienceMs = PATIENCE_MS) {
+    const isSlow = ({ head, since }) => head.target === "/render" && performance.now() - since >= patienceMs;
     if (![...this.#waiting.values()].some(isSlow)) return;
     for (const { resolve, head } of this.#end()) {
       const isImage = head.target === "/render";
