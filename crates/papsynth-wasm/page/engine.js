@@ -9,8 +9,8 @@ const PATIENCE_MS = 1000;
 /** Numbers of images that one instance may use. */
 const IMAGES = 1_000_000;
 
-/** The compiled engine; set by `load`. */
-let module = null;
+/** The compiled engine. */
+let compiled = null;
 
 /** A worker with an instance of the engine. */
 class Instance {
@@ -26,7 +26,7 @@ class Instance {
     const worker = new Worker("worker.js");
     worker.addEventListener("message", ({ data }) => this.#receive(data));
     worker.addEventListener("error", () => this.#fail());
-    worker.postMessage({ module, imagesBefore: IMAGES * this.#started });
+    worker.postMessage({ module: compiled, imagesBefore: IMAGES * this.#started });
     this.#started += 1;
     this.#worker = worker;
     for (const { head, body } of this.#kept) worker.postMessage({ number: 0, head, body });
@@ -86,10 +86,11 @@ function cancelled() {
   return new Response(new Blob([new Uint32Array([text.length]), text]));
 }
 
-/** The instances: for images, for reduced images and text, and for small images. */
-const [full, reduced, small] = [new Instance(), new Instance(), []];
+/** The instances for images, for reduced images and text, and for small images. */
+const instances = { full: new Instance(), reduced: new Instance(), small: [] };
 
 function instanceFor(target, options) {
+  const { full, reduced, small } = instances;
   if (target === "/render") {
     const { view } = JSON.parse(options.body);
     if (view === "small") return small.find((instance) => !instance.isBusy) ?? small[0];
@@ -103,45 +104,44 @@ async function bytesOf(body) {
   return new Uint8Array(await new Response(body).arrayBuffer());
 }
 
-let begun = null;
-const loaded = new Promise((resolve) => { begun = resolve; });
+/** Called when the engine is compiled. */
+let setCompiled = () => {};
+const compiling = new Promise((resolve) => { setCompiled = resolve; });
 
 send = async (path, options) => {
-  await loaded;
+  await compiling;
   const target = `/${path}`;
   const head = { method: options.method ?? "GET", target, content_type: options.headers?.["Content-Type"] ?? null };
-  const instance = instanceFor(target, options);
-  return instance.ask(head, await bytesOf(options.body));
+  return instanceFor(target, options).ask(head, await bytesOf(options.body));
 };
 
-outdate = () => [full, reduced, ...small].forEach((instance) => instance.giveUp());
+outdate = () => {
+  for (const instance of Object.values(instances).flat()) instance.giveUp();
+};
 
 // The start: a picture and a button.
+{
+  const button = element("load");
+  /** The parts of the page that need the engine. */
+  const parts = [...document.querySelectorAll("#bar > :not(a, h1), #recipe, #tools, #strip, aside")];
+  for (const part of parts) part.inert = true;
 
-const start = element("start");
-const button = element("load");
-
-/** The parts of the page that need the engine. */
-const parts = [...document.querySelectorAll("#bar, #recipe, #tools, #strip, aside")];
-
-async function load() {
-  button.disabled = true;
-  element("loading").textContent = "Loading …";
-  try {
-    const response = await fetch("engine.wasm.zlib");
-    if (!response.ok) throw new Error(`${response.status} ${response.statusText}`);
-    const plain = response.body.pipeThrough(new DecompressionStream("deflate"));
-    module = await WebAssembly.compile(await new Response(plain).arrayBuffer());
-    parallel = Math.max(1, Math.min(navigator.hardwareConcurrency - 1, 4));
-    small.push(...Array.from({ length: parallel }, () => new Instance()));
-    begun();
-    start.remove();
-    for (const part of parts) part.inert = false;
-  } catch (error) {
-    button.disabled = false;
-    element("loading").textContent = `The engine cannot be loaded: ${error.message}.`;
-  }
+  button.addEventListener("click", async () => {
+    button.disabled = true;
+    element("loading").textContent = "Loading …";
+    try {
+      const response = await fetch("engine.wasm.zlib");
+      if (!response.ok) throw new Error(`${response.status} ${response.statusText}`);
+      const plain = response.body.pipeThrough(new DecompressionStream("deflate"));
+      compiled = await WebAssembly.compile(await new Response(plain).arrayBuffer());
+      parallel = Math.max(1, Math.min(navigator.hardwareConcurrency - 1, 4));
+      instances.small = Array.from({ length: parallel }, () => new Instance());
+      setCompiled();
+      element("start").remove();
+      for (const part of parts) part.inert = false;
+    } catch (error) {
+      button.disabled = false;
+      element("loading").textContent = `The engine cannot be loaded: ${error.message}.`;
+    }
+  });
 }
-
-for (const part of parts) part.inert = true;
-button.addEventListener("click", load);

@@ -87,9 +87,9 @@ def main():
         assert browser.run("shown.head.id < IMAGES")
         browser.run("""(async () => {
             edit(["optics", "condenser_na"], 0.5);
-            while (!full.isBusy) await new Promise((resolve) => setTimeout(resolve));
+            while (!instances.full.isBusy) await new Promise((resolve) => setTimeout(resolve));
             edit(["camera", "bits"], 12);
-            full.giveUp(0);
+            instances.full.giveUp(0);
         })()""")
         browser.until("shown.head.bits === 12 && shown.head.factor === 1")
         assert browser.run("shown.head.id > IMAGES"), "the instance is another one"
