@@ -97,7 +97,8 @@ mod tests {
 
     #[test]
     fn scripts_and_styles_are_found() {
-        let html = "<link rel=\"icon\" href=\"data:,\"><link rel=\"stylesheet\" href=\"a.css\"><script src=\"b.js\" defer>";
+        let html =
+            "<link rel=\"icon\" href=\"data:,\"><link rel=\"stylesheet\" href=\"a.css\"><script src=\"b.js\" defer>";
         assert_eq!(Vec::from_iter(files(html)), ["b.js", "a.css"]);
     }
 

@@ -37,12 +37,12 @@ const RULES: [(&[&str], &[&[&str]]); 17] = [
     (&["papsynth-study"], &[NUMERICS, &["papsynth-dataset"]]),
     // Fits with the techniques, finds regions like the reader of label images, and writes sections of recipes.
     (&["papsynth-calibrate"], &[NUMERICS, TECHNIQUES, ENGINE, &["papsynth-dataset"]]),
-    // Shows files and a study; the engine defines the groups of objects.
-    (&["papsynth-web"], &[ENGINE, &["papsynth-dataset", "papsynth-judge", "papsynth-study"]]),
-    // Passes requests of a page without a server to the workbench.
-    (&["papsynth-wasm"], &[ENGINE, &["papsynth-web"]]),
     // Simulates with the engine and measures with the judge.
     (&["papsynth-match"], &[NUMERICS, ENGINE, &["papsynth-judge", "dye-spectra"]]),
+    // Shows files and a study; the workbench shows images of the engine and their match to images of the user.
+    (&["papsynth-web"], &[ENGINE, &["papsynth-dataset", "papsynth-judge", "papsynth-match", "papsynth-study"]]),
+    // Passes requests of a page without a server to the workbench.
+    (&["papsynth-wasm"], &[ENGINE, &["papsynth-web"]]),
     // Translates errors of the techniques to options of `papsynth calibrate`.
     (&["papsynth-cli"], &[TECHNIQUES, ENGINE, FRONT, &["papsynth-match", "papsynth-study", "papsynth-web"]]),
     // The same for Python.

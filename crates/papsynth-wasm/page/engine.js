@@ -94,7 +94,7 @@ function instanceFor(target, options) {
   if (target === "/render") {
     const { view } = JSON.parse(options.body);
     if (view === "small") return small.find((instance) => !instance.isBusy) ?? small[0];
-    return view === "reduced" ? reduced : full;
+    return view === "full" ? full : reduced;
   }
   return ["/info", "/check", "/print"].includes(target) ? reduced : full;
 }
