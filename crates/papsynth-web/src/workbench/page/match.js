@@ -21,6 +21,7 @@ const matchRequest = () => ({
 async function planMatch() {
   if (reals.length === 0) return;
   element("match").hidden = !info.matches;
+  element("no-match").hidden = info.matches;
   if (!info.matches) return;
   element("match-start").disabled = matching || reals.length < LEAST_REALS;
   if (reals.length < LEAST_REALS) {
