@@ -12,16 +12,19 @@ const IMAGES = 1_000_000;
 /** The compiled engine. */
 let compiled = null;
 
+/** Returns a reply with an error, as the engine writes it. */
+const failed = (status, error) => new Response(JSON.stringify({ error }), { status });
+
 /** A worker with an instance of the engine. */
 class Instance {
   #worker = null;
   #started = 0;
   #number = 0;
+  /** Requests without a reply by number. */
   #waiting = new Map();
-  /** Images of the user, for a new instance. */
+  /** Requests about images of the user, which each new instance gets again. */
   #kept = [];
 
-  /** Starts the worker, if necessary anew. The instance then has no image, and those of the user again. */
   #start() {
     const worker = new Worker("worker.js");
     worker.addEventListener("message", ({ data }) => this.#receive(data));
@@ -29,54 +32,58 @@ class Instance {
     worker.postMessage({ module: compiled, imagesBefore: IMAGES * this.#started });
     this.#started += 1;
     this.#worker = worker;
-    for (const { head, body } of this.#kept) worker.postMessage({ number: 0, head, body });
+    for (const kept of this.#kept) worker.postMessage(kept);
   }
 
   #end() {
-    this.#worker?.terminate();
+    this.#worker.terminate();
     this.#worker = null;
-    const waiting = [...this.#waiting.values()];
-    this.#waiting.clear();
-    return waiting;
   }
 
   #fail() {
-    const error = JSON.stringify({ error: "The engine failed at this request, and was started again." });
-    for (const { resolve } of this.#end()) resolve(new Response(error, { status: 500 }));
+    this.#end();
+    this.#kept = this.#kept.filter(({ number }) => !this.#waiting.has(number));
+    for (const { resolve } of this.#waiting.values()) {
+      resolve(failed(500, "The engine failed at this request, and is started again."));
+    }
+    this.#waiting.clear();
   }
 
   #receive({ number, head, body, failure }) {
-    if (failure) this.#fail();
+    if (failure) {
+      this.#fail();
+      return;
+    }
     const waiting = this.#waiting.get(number);
-    if (!waiting) return;
     this.#waiting.delete(number);
-    waiting.resolve(new Response(body, { status: head.status, headers: { "Content-Type": head.content_type } }));
+    waiting?.resolve(new Response(body, { status: head.status, headers: { "Content-Type": head.content_type } }));
   }
 
   /** Returns the reply to a request. */
   ask(head, body) {
     if (!this.#worker) this.#start();
-    if (head.target.startsWith("/real")) this.#kept.push({ head, body });
     const number = (this.#number += 1);
-    const reply = new Promise((resolve) => {
-      this.#waiting.set(number, { resolve, head, since: performance.now() });
-    });
-    this.#worker.postMessage({ number, head, body });
-    return reply;
+    const message = { number, head, body };
+    if (head.target.startsWith("/real")) this.#kept.push(message);
+    this.#worker.postMessage(message);
+    return new Promise((resolve) => this.#waiting.set(number, { resolve, head, since: performance.now() }));
   }
 
   get isBusy() {
     return this.#waiting.size > 0;
   }
 
-  /** Gives up an image that takes long, and what waits for it. */
+  /** Gives up an image that takes long, and what waits for it. The next instance has no image yet. */
   giveUp(patienceMs = PATIENCE_MS) {
     const isSlow = ({ head, since }) => head.target === "/render" && performance.now() - since >= patienceMs;
     if (![...this.#waiting.values()].some(isSlow)) return;
-    for (const { resolve, head } of this.#end()) {
-      const isImage = head.target === "/render";
-      resolve(isImage ? cancelled() : new Response(JSON.stringify({ error: "replaced" }), { status: 404 }));
+    this.#end();
+    for (const [number, { resolve, head }] of this.#waiting) {
+      if (head.target.startsWith("/real")) continue;
+      this.#waiting.delete(number);
+      resolve(head.target === "/render" ? cancelled() : failed(404, "another image replaces this one"));
     }
+    if (this.isBusy) this.#start();
   }
 }
 
