@@ -1,6 +1,7 @@
 //! The gallery of presets.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
+use serde_json::Value;
 
 use crate::Input;
 use crate::page::{Group, Page};
@@ -30,6 +31,18 @@ pub(crate) fn page(input: &Input) -> Result<Page> {
     let mut page = Page::new("gallery/presets.html", Group::Gallery, "Presets", text);
     page.source = source.to_owned();
     Ok(page)
+}
+
+/// Checks that the gallery of debris has a command for each kind of the schema.
+pub(crate) fn check(input: &Input) -> Result<()> {
+    let schema: Value = serde_json::from_str(&input.papsynth(&["schema"])?).context("the output of papsynth schema")?;
+    let kinds = schema.pointer("/$defs/Debris/properties").and_then(Value::as_object);
+    let source = "site/pages/gallery/debris.md";
+    let text = input.read(source)?;
+    for kind in kinds.context("the schema has no kinds of debris")?.keys() {
+        ensure!(text.contains(&format!("--set debris.{kind}.")), "{source}: no command shows `debris.{kind}`");
+    }
+    Ok(())
 }
 
 /// Returns a text whose first letter is a capital.

@@ -92,6 +92,7 @@ fn main() -> ExitCode {
 
 fn build(input: &Input) -> Result<()> {
     replace(&input.out)?;
+    gallery::check(input)?;
     let mut pages = vec![gallery::page(input)?];
     pages.extend(sources::pages(input)?);
     pages.extend(reference::pages(input)?);

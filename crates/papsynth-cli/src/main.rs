@@ -134,7 +134,8 @@ fn init(args: &Init) -> Result<(), ExitError> {
         None => exit::print(&recipe()?),
         Some(path) => {
             let out = OutputFile::check(path, Kind::Recipe, args.force)?;
-            out.write(recipe()?.as_bytes())
+            out.write(recipe()?.as_bytes())?;
+            exit::print(&format!("{}: recipe written; `papsynth preview` shows one of its fields\n", path.display()))
         }
     }
 }

@@ -62,6 +62,7 @@ Examples:
   papsynth init --preset dense --out dense.toml   write a commented recipe to edit
   papsynth preview dense.toml                     show one field next to its ground truth
   papsynth generate dense.toml --out dense --frames 100
+  papsynth match images --pixel-um 0.33 --out mine.toml    find a recipe for fields like yours
 
 Exit codes:
     0  success
