@@ -10,7 +10,7 @@ use anyhow::{Context, Result, ensure};
 use pulldown_cmark::{CodeBlockKind, Event, Tag, TagEnd};
 
 use crate::page::{Page, escape};
-use crate::{Input, Pictures, workbench, write};
+use crate::{Input, Pictures, fragment, write};
 
 /// Begins the address of a picture that a command makes.
 const MADE: &str = "made:";
@@ -108,7 +108,7 @@ impl<'a> Figures<'a> {
     fn links(&self, text: &str) -> Result<String> {
         let mut links = String::new();
         for words in commands(text)?.iter().filter(|words| words[0] == "generate") {
-            let address = workbench::address(self.input, &self.folder, &words[1..])
+            let address = fragment::address(self.input, &self.folder, &words[1..])
                 .with_context(|| format!("papsynth {}", words.join(" ")))?;
             let address = escape(&self.page.address_of(&address));
             links += &format!("<p><a href=\"{address}\">Open this field in the workbench</a></p>\n");
@@ -166,7 +166,7 @@ fn text_of<'e>(event: &'e Event<'_>) -> Option<&'e str> {
 }
 
 /// Returns width and height of a PNG image.
-fn size(bytes: &[u8]) -> Option<[u32; 2]> {
+pub(crate) fn size(bytes: &[u8]) -> Option<[u32; 2]> {
     let number = |at: usize| Some(u32::from_be_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
     bytes.starts_with(b"\x89PNG").then(|| Some([number(16)?, number(20)?]))?
 }

@@ -5,8 +5,8 @@ use std::fs;
 
 use anyhow::{Context, Result, ensure};
 
+use crate::Input;
 use crate::page::{Page, folder, join};
-use crate::{Input, workbench};
 
 /// Checks all pages as they are written, and returns the number of links within the site.
 pub(crate) fn check(input: &Input, pages: &[Page]) -> Result<usize> {
@@ -16,9 +16,7 @@ pub(crate) fn check(input: &Input, pages: &[Page]) -> Result<usize> {
         let text = fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
         texts.insert(page.path.as_str(), text);
     }
-    // The workbench may be built later.
-    let exists = |path: &str| path == workbench::PAGE || input.out.join(path).is_file();
-    let (problems, count) = problems(&texts, exists);
+    let (problems, count) = problems(&texts, |path| input.out.join(path).is_file());
     ensure!(problems.is_empty(), "{} problems in links of the site:\n{}", problems.len(), problems.join("\n"));
     Ok(count)
 }

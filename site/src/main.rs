@@ -9,6 +9,7 @@
 
 mod equations;
 mod figures;
+mod fragment;
 mod gallery;
 mod layout;
 mod links;
@@ -16,7 +17,6 @@ mod markdown;
 mod page;
 mod reference;
 mod sources;
-mod workbench;
 
 use std::fs;
 use std::path::{Path, PathBuf};

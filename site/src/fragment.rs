@@ -7,8 +7,8 @@ use serde_json::{Map, Value, json};
 
 use crate::Input;
 
-/// The page of the workbench. It is built apart from the other pages.
-pub(crate) const PAGE: &str = "workbench/index.html";
+/// The page of the workbench.
+const PAGE: &str = "workbench/index.html";
 
 /// Preset of commands without one.
 const DEFAULT: &str = "lbc";
