@@ -33,6 +33,7 @@ pub(crate) fn html(page: &Page, pages: &[Page]) -> String {
 <a class="skip" href="#content">Skip to the content</a>
 <header>
 <a class="name" href="{root}index.html">papsynth</a>
+<a href="{root}workbench/index.html">Workbench</a>
 <div class="search" role="search" hidden>
 <input type="search" id="search" aria-label="Search" placeholder="Search ( / )" autocomplete="off" spellcheck="false">
 <ol id="found" aria-label="Results" aria-live="polite" hidden></ol>

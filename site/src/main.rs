@@ -1,8 +1,8 @@
 //! Generates the documentation site: plain files that need no server.
 //!
-//! `papsynth-site ROOT PROGRAM OUT [--no-pictures]` reads the pages of the repository in ROOT, asks the program for the
-//! schema, the presets and the pictures of figures, and replaces the folder OUT. Links and anchors within the site are
-//! checked.
+//! `papsynth-site ROOT PROGRAM ENGINE OUT [--no-pictures]` reads the pages of the repository in ROOT, asks the program
+//! for the schema, the presets and the pictures of figures, and replaces the folder OUT. ENGINE is the engine in
+//! WebAssembly. Links and anchors within the site are checked.
 
 #![forbid(unsafe_code)]
 #![expect(clippy::print_stdout, reason = "a command line program")]
@@ -17,6 +17,7 @@ mod markdown;
 mod page;
 mod reference;
 mod sources;
+mod workbench;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -33,6 +34,8 @@ pub(crate) struct Input {
     pub(crate) root: PathBuf,
     /// The program `papsynth`.
     program: PathBuf,
+    /// The engine in WebAssembly.
+    pub(crate) engine: PathBuf,
     /// Folder to write.
     pub(crate) out: PathBuf,
     /// Whether the commands of figures are run.
@@ -49,14 +52,16 @@ pub(crate) enum Pictures {
 impl Input {
     fn from_arguments() -> Result<Self> {
         let words: Vec<String> = std::env::args().skip(1).collect();
-        let (root, program, out, pictures) = match words.as_slice() {
-            [root, program, out] => (root, program, out, Pictures::Rendered),
-            [root, program, out, option] if option == "--no-pictures" => (root, program, out, Pictures::LeftOut),
-            _ => bail!("expected ROOT PROGRAM OUT [--no-pictures]; `cargo xtask site` gives these arguments"),
+        let (paths, pictures) = match words.split_last() {
+            Some((option, paths)) if option == "--no-pictures" => (paths, Pictures::LeftOut),
+            _ => (&words[..], Pictures::Rendered),
+        };
+        let [root, program, engine, out] = paths else {
+            bail!("expected ROOT PROGRAM ENGINE OUT [--no-pictures]; `cargo xtask site` gives these arguments")
         };
         // Commands run in other folders.
         let program = fs::canonicalize(program).with_context(|| format!("cannot find the program {program}"))?;
-        Ok(Self { root: root.into(), program, out: out.into(), pictures })
+        Ok(Self { root: root.into(), program, engine: engine.into(), out: out.into(), pictures })
     }
 
     /// Reads a file of the repository.
@@ -108,6 +113,7 @@ fn build(input: &Input) -> Result<()> {
     write(&input.out.join("style.css"), include_str!("style.css"))?;
     write(&input.out.join("site.js"), include_str!("site.js"))?;
     write(&input.out.join("search.js"), layout::search(&pages)?)?;
+    workbench::write_page(input)?;
     let count = links::check(input, &pages)?;
     println!("{} pages; {count} links and anchors within the site are valid", pages.len());
     println!("open {}", input.out.join("index.html").display());

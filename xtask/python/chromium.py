@@ -106,7 +106,7 @@ class Browser:
         raise SystemExit(f"waited for {condition}; {otherwise()}")
 
     def press(self, key):
-        codes = {" ": ("Space", 32), "ArrowLeft": ("ArrowLeft", 37), "ArrowRight": ("ArrowRight", 39)}
+        codes = {" ": ("Space", 32), "Tab": ("Tab", 9), "ArrowLeft": ("ArrowLeft", 37), "ArrowRight": ("ArrowRight", 39)}
         code, number = codes.get(key, (f"Key{key.upper()}", ord(key.upper()[0])))
         fields = {"key": key, "code": code, "windowsVirtualKeyCode": number}
         text = {"text": key} if len(key) == 1 else {}

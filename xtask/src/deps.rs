@@ -24,7 +24,7 @@ const ENGINE: &[&str] = &["papsynth"];
 
 /// Crates and their allowed dependencies within the workspace, including those of tests, from the bottom up. A new
 /// crate needs a line here and a reason in ARCHITECTURE.md.
-const RULES: [(&[&str], &[&[&str]]); 16] = [
+const RULES: [(&[&str], &[&[&str]]); 17] = [
     (NUMERICS, &[]),
     (TECHNIQUES, &[NUMERICS]),
     (ENGINE, &[NUMERICS, TECHNIQUES]),
@@ -37,10 +37,12 @@ const RULES: [(&[&str], &[&[&str]]); 16] = [
     (&["papsynth-study"], &[NUMERICS, &["papsynth-dataset"]]),
     // Fits with the techniques, finds regions like the reader of label images, and writes sections of recipes.
     (&["papsynth-calibrate"], &[NUMERICS, TECHNIQUES, ENGINE, &["papsynth-dataset"]]),
-    // Shows files and a study; the engine defines the groups of objects.
-    (&["papsynth-web"], &[ENGINE, &["papsynth-dataset", "papsynth-judge", "papsynth-study"]]),
     // Simulates with the engine and measures with the judge.
     (&["papsynth-match"], &[NUMERICS, ENGINE, &["papsynth-judge", "dye-spectra"]]),
+    // Shows files and a study; the workbench shows images of the engine and their match to images of the user.
+    (&["papsynth-web"], &[ENGINE, &["papsynth-dataset", "papsynth-judge", "papsynth-match", "papsynth-study"]]),
+    // Passes requests of a page without a server to the workbench.
+    (&["papsynth-wasm"], &[ENGINE, &["papsynth-web"]]),
     // Translates errors of the techniques to options of `papsynth calibrate`.
     (&["papsynth-cli"], &[TECHNIQUES, ENGINE, FRONT, &["papsynth-match", "papsynth-study", "papsynth-web"]]),
     // The same for Python.

@@ -1,4 +1,5 @@
 use core::f64::consts::{PI, TAU};
+use core::ops::ControlFlow;
 
 use num_complex::Complex64;
 use portable_numerics::fourier::{ComplexPlane, PlaneScratch};
@@ -102,6 +103,8 @@ struct Plane {
     plan: ComplexPlane<f64, 8>,
     field: Vec<Complex64>,
     spectrum: Vec<Complex64>,
+    /// Spectrum of the amplitude behind the deepest layer.
+    entering: Vec<Complex64>,
     scratch: PlaneScratch<f64, 8>,
 }
 
@@ -145,6 +148,24 @@ impl Abbe {
     ///
     /// If the number of samples of a layer differs from that of the grid.
     pub fn image(&self, layers: &[Layer], stage_um: f64) -> Result<Vec<f64>, Error> {
+        Ok(self.image_while(layers, stage_um, &|| true)?.unwrap_or_default())
+    }
+
+    /// As [`image`](Self::image), or `None` as soon as `goes_on` returns false. It is called before each pair of FFTs.
+    ///
+    /// # Errors
+    ///
+    /// As `image`.
+    ///
+    /// # Panics
+    ///
+    /// As `image`.
+    pub fn image_while(
+        &self,
+        layers: &[Layer],
+        stage_um: f64,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Result<Option<Vec<f64>>, Error> {
         distance("stage_um", stage_um)?;
         let samples = self.params.width * self.params.height;
         for layer in layers {
@@ -152,20 +173,23 @@ impl Abbe {
         }
         let mut layers: Vec<&Layer> = layers.iter().collect();
         layers.sort_by(|a, b| a.depth_um.total_cmp(&b.depth_um));
-        let Some(first) = layers.first() else { return Ok(vec![1.0; samples]) };
+        let Some(first) = layers.first() else { return Ok(Some(vec![1.0; samples])) };
         let mut plane = Plane {
             plan: ComplexPlane::new(self.params.width, self.params.height),
             field: first.amplitude.iter().map(|&[re, im]| Complex64::new(re, im)).collect(),
-            spectrum: vec![Complex64::ZERO; samples],
+            spectrum: Vec::new(),
+            entering: vec![Complex64::ZERO; samples],
             scratch: PlaneScratch::default(),
         };
-        plane.plan.forward(&plane.field, &mut plane.spectrum, &mut plane.scratch);
-        let entering = plane.spectrum.clone();
+        plane.plan.forward(&plane.field, &mut plane.entering, &mut plane.scratch);
+        plane.spectrum.clone_from(&plane.entering);
         let mut image = vec![0.0; samples];
         for band in self.microscope.bands() {
-            self.add(band, &layers, stage_um, &entering, &mut plane, &mut image);
+            if self.add(band, &layers, stage_um, goes_on, &mut plane, &mut image).is_break() {
+                return Ok(None);
+            }
         }
-        Ok(image)
+        Ok(Some(image))
     }
 
     /// Adds the image of one wavelength with its weight.
@@ -174,10 +198,11 @@ impl Abbe {
         (wavelength_um, weight): (f64, f64),
         layers: &[&Layer],
         stage_um: f64,
-        entering: &[Complex64],
+        goes_on: &dyn Fn() -> bool,
         plane: &mut Plane,
         image: &mut [f64],
-    ) {
+    ) -> ControlFlow<()> {
+        let check = || if goes_on() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
         let params = self.microscope.params();
         let pupil = |depth, stage| Pupil::new(params, wavelength_um, depth, stage);
         let lens = pupil(layers.last().map_or(0.0, |layer| layer.depth_um), stage_um);
@@ -190,8 +215,9 @@ impl Abbe {
         let travelling = params.mount_index / wavelength_um;
         let samples = image.len() as f64;
         for s in directions {
-            plane.spectrum.copy_from_slice(entering);
+            plane.spectrum.copy_from_slice(&plane.entering);
             for (step, layer) in &steps {
+                check()?;
                 let wave = |f| (square(f) < travelling * travelling).then(|| step.medium_waves(square(f)));
                 self.filter(plane, s, travelling, wave);
                 for (value, &[re, im]) in plane.field.iter_mut().zip(&layer.amplitude) {
@@ -199,12 +225,14 @@ impl Abbe {
                 }
                 plane.plan.forward(&plane.field, &mut plane.spectrum, &mut plane.scratch);
             }
+            check()?;
             self.filter(plane, s, lens.objective + RIM, |f| lens.passes(square(f)).then(|| lens.waves(f)));
             let scale = scale / (samples * samples);
             for (sum, value) in image.iter_mut().zip(&plane.field) {
                 *sum += scale * value.norm_sqr();
             }
         }
+        ControlFlow::Continue(())
     }
 
     /// Propagates the spectrum of an envelope, illuminated from direction `s`, by exp 2πi · `waves` at f + s, and

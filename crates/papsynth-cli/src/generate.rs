@@ -132,8 +132,8 @@ struct Timing {
 }
 
 /// Time since the first call.
-#[expect(clippy::disallowed_methods, reason = "the time is printed and reaches no image")]
-fn now() -> Duration {
+#[expect(clippy::disallowed_methods, reason = "the time is shown and reaches no image")]
+pub(crate) fn now() -> Duration {
     static BEGUN: OnceLock<Instant> = OnceLock::new();
     BEGUN.get_or_init(Instant::now).elapsed()
 }

@@ -37,7 +37,8 @@ pub(crate) fn run(args: &Preview) -> Result<(), ExitError> {
     })?;
     let Some(plane) = shown else { return Ok(()) };
     out.write_rgb(&side_by_side(&plane, &finished))?;
-    print_size(&args.out, &finished.scene)
+    print_size(&args.out, &finished.scene)?;
+    exit::print(&format!("SHA-256 of the grey levels: {}\n", plane.sha256(finished.scene.camera.bits)))
 }
 
 /// A plane on the left, and the plane with outlines of its ground truth on the right.

@@ -157,10 +157,12 @@ impl Sources {
         // The user does not see this text, so only the paths of the fields are kept.
         let mut recipe = diagnose::read(&text)
             .map_err(|faults| faults.into_iter().map(|f| FieldError { span: None, ..f }).collect::<Vec<_>>())?;
-        recipe.clear_conditions(|path| {
-            let path: Vec<String> = path.split('.').map(str::to_owned).collect();
-            self.sets.iter().any(|set| set.replaces(&path))
-        });
+        if !self.sets.iter().any(|set| set.key == "conditions") {
+            recipe.clear_conditions(|path| {
+                let path: Vec<String> = path.split('.').map(str::to_owned).collect();
+                self.sets.iter().any(|set| set.replaces(&path))
+            });
+        }
         Ok(recipe)
     }
 

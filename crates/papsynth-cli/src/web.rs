@@ -10,7 +10,7 @@ use papsynth_web::{Error, Server, serve_study};
 use crate::args::{Study, View, Workbench};
 use crate::exit::{self, ErrorReport, ExitError};
 use crate::setup::Setup;
-use crate::{memory, preview};
+use crate::{generate, memory, preview};
 
 /// Opens a page in the default browser.
 fn open(address: &str) {
@@ -57,6 +57,8 @@ pub(crate) fn workbench(args: &Workbench) -> Result<(), ExitError> {
         seed: args.engine.seed,
         threads,
         max_memory: memory::limit(args.max_memory),
+        clock: generate::now,
+        images_before: 0,
     };
     let workbench = papsynth_web::Workbench::new(params)?;
     let server = Server::bind(args.port.unwrap_or(0))?;

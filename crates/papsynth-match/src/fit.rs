@@ -221,6 +221,13 @@ impl Match {
         (setting, known)
     }
 
+    /// Returns the number of fields to simulate for real fields, without those of the search against classifiers.
+    #[must_use]
+    pub fn simulated(&self, fields: usize, colour: bool) -> usize {
+        let MatchParams { simulations, rounds, .. } = self.params;
+        simulations + rounds * per_round(fields) + 2 * COMPARED + corrected(colour).iter().sum::<usize>()
+    }
+
     /// Finds the recipe of real fields. The result does not depend on the number of threads.
     ///
     /// The phases of the progress reports are "measuring fields" and "simulating fields", which continue one count, and
@@ -243,11 +250,10 @@ impl Match {
                 what: "a search against classifiers",
             });
         }
-        let per_round = ROUND.max(fields.len().min(2 * ROUND));
+        let per_round = per_round(fields.len());
         let colour = fields.iter().all(|field| field.red_blue.is_some());
-        let corrected = if colour { CORRECTIONS.map(|rounds| rounds * HUED) } else { [0; 2] };
-        let count =
-            self.params.simulations + self.params.rounds * per_round + 2 * COMPARED + corrected.iter().sum::<usize>();
+        let corrected = corrected(colour);
+        let count = self.simulated(fields.len(), colour);
         let total = 2 * fields.len() + count;
         let phase = control.resume("measuring fields", 0, total);
         let measured = measure_in(fields, self.params.pixel.um(), &phase)?;
@@ -367,6 +373,16 @@ impl Match {
         initial.slide.fields_per_slide = 1;
         initial
     }
+}
+
+/// Returns the fields to simulate in a round.
+fn per_round(fields: usize) -> usize {
+    ROUND.max(fields.min(2 * ROUND))
+}
+
+/// Returns the fields to simulate for the corrections of the hues of stains, before and after the search.
+fn corrected(colour: bool) -> [usize; 2] {
+    if colour { CORRECTIONS.map(|rounds| rounds * HUED) } else { [0; 2] }
 }
 
 /// Measures real fields: the mean over the samples of each, and the number of samples of a field.

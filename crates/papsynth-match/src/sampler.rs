@@ -35,8 +35,13 @@ impl Sampler {
     pub fn new(field_px: [usize; 2], pixel_um: f64, from: NucleiFrom, detail: Detail) -> Result<Self, Error> {
         let measurer =
             Measurer::new(&MeasurerParams { pixel_um, nuclei_from: from, detail, ..MeasurerParams::default() })?;
-        let size_px = [0, 1].map(|i| field_px[i].min(SAMPLE_PX[i]));
-        Ok(Self { size_px, pixel_um, from, colour: false, measurer })
+        Ok(Self { size_px: Self::size_of(field_px), pixel_um, from, colour: false, measurer })
+    }
+
+    /// Returns the size of the samples of fields of a size, pixels.
+    #[must_use]
+    pub fn size_of(field_px: [usize; 2]) -> [usize; 2] {
+        [0, 1].map(|i| field_px[i].min(SAMPLE_PX[i]))
     }
 
     /// Also measures the hues of stains, or does not: all images are colour images.

@@ -24,6 +24,7 @@ pub enum Error {
     #[error(transparent)]
     Engine(Box<papsynth::Error>),
     /// A study cannot be saved.
+    #[cfg(feature = "server")]
     #[error(transparent)]
     Study(Box<papsynth_study::Error>),
 }
@@ -40,6 +41,7 @@ impl From<papsynth::Error> for Error {
     }
 }
 
+#[cfg(feature = "server")]
 impl From<papsynth_study::Error> for Error {
     fn from(error: papsynth_study::Error) -> Self {
         Self::Study(Box::new(error))
@@ -52,6 +54,7 @@ impl Error {
     pub fn is_io(&self) -> bool {
         match self {
             Self::Dataset(error) => error.is_io(),
+            #[cfg(feature = "server")]
             Self::Study(error) => error.is_io(),
             Self::Engine(_) | Self::Listen { .. } | Self::Clock => false,
         }

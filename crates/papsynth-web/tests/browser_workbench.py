@@ -33,7 +33,7 @@ class Workbench(Browser):
 
     def hash(self):
         self.ready()
-        self.until("document.body.dataset.hash !== undefined && element('hash').title === document.body.dataset.hash")
+        self.until("document.body.dataset.hash !== undefined && element('hash').textContent === document.body.dataset.hash")
         return self.run("document.body.dataset.hash")
 
     def change(self, selector, value):
@@ -172,6 +172,122 @@ def check_preset(browser):
     browser.until("element('real-shown').hidden")
 
 
+# Large pixels: many cells in a small field.
+MATCHED = """(async () => {
+    const wait = async () => {
+        do await new Promise((resolve) => setTimeout(resolve, 10)); while (running || dirty || shown.head.factor > 1);
+    };
+    settle();
+    setPreset(info.presets.find(({ name }) => name === "lbc"));
+    const cells = Object.entries(state.recipe.cells).map(([name, mix]) => [name, { ...mix, count: 4 }]);
+    const field = { ...state.recipe.field, width_px: 340, height_px: 260, pixel_um: 0.5 };
+    setRecipe({ ...state.recipe, field, cells: Object.fromEntries(cells) });
+    await wait();
+    const files = [];
+    for (const index of [0, 1]) {
+        go(index);
+        await wait();
+        const blob = await (await fetch(`image.png/${shown.head.id}`)).blob();
+        files.push(new File([blob], `field-${index}.png`));
+    }
+    await useReals(files);
+    element("real-um").value = 0.5;
+    element("real-um").dispatchEvent(new Event("input"));
+    setPreset(info.presets.find(({ name }) => name === "lbc"));
+})()"""
+
+
+def check_match(browser, program, folder):
+    """Matches the recipe to two images: cancels a match, runs another one, compares its field with the command line."""
+    browser.run(MATCHED)
+    assert browser.run("reals.length") == 2
+    browser.click("#match-quick")
+    browser.until("/simulated fields, about [0-9]+ /.test(element('match-plan').textContent)")
+    browser.click("#match-start")
+    browser.until("element('match-progress').value > 0 && !element('match-cancel').hidden")
+    browser.picture(folder / "matching.png")
+    browser.click("#match-cancel")
+    browser.until("element('match-status').textContent === 'Match cancelled.' && !element('match-start').hidden")
+    assert browser.run("state.recipe === state.base"), "a cancelled match changes nothing"
+    browser.click("#match-start")
+    shown = lambda: browser.run("element('match-status').textContent")  # noqa: E731
+    browser.until("document.querySelectorAll('#match-found li').length > 5", shown)
+    assert browser.run("state.recipe.conditions.length") == 2
+    assert browser.run("state.recipe.field.width_px") == 340
+    matched = browser.hash()
+    browser.picture(folder / "matched.png")
+    command = browser.run("commandLine()")
+    assert generated(program, command, folder, "matched") == matched, command
+    # A number of the form replaces those of the conditions.
+    path = "background.level"
+    assert browser.run(f"conditionsAt('{path}'.split('.')).length") == 2
+    browser.find(path.replace(".", " "))
+    browser.change(f"[data-path='{path}'] input[type=range]", "0.7")
+    assert browser.run(f"conditionsAt('{path}'.split('.')).length") == 0
+    browser.find("")
+    browser.click("#undo")
+    browser.click("#undo")
+    assert browser.run("state.recipe === state.base"), "undo restores the recipe before the match"
+    browser.click("#real-remove")
+    browser.click("#real-remove")
+
+
+# Roles of controls and of graphics in the accessibility tree.
+NAMED = {
+    "button", "checkbox", "combobox", "DisclosureTriangle", "image", "link", "meter", "progressbar", "searchbox",
+    "slider", "spinbutton", "tab", "textbox",
+}
+
+# What the browser focuses with the Tab key, in the order of the document.
+FOCUSABLE = """[...document.querySelectorAll("a[href], button, input, select, textarea, summary, [tabindex]")]
+    .filter((node) => !node.disabled && node.tabIndex >= 0 && node.checkVisibility())"""
+
+# Opens all sections of the page; those of the form are filled when they are opened.
+OPEN_ALL = """(async () => {
+    for (;;) {
+        const closed = [...document.querySelectorAll("details:not([open])")];
+        if (closed.length === 0) return;
+        closed.forEach((node) => { node.open = true; });
+        await new Promise((resolve) => setTimeout(resolve, 20));
+    }
+})()"""
+
+
+def check_access(browser):
+    """Checks names of controls, the order of the focus, its visibility, and the layout at 1024 pixels."""
+    browser.run(OPEN_ALL)
+    browser.call("Accessibility.enable")
+    nodes = browser.call("Accessibility.getFullAXTree")["nodes"]
+    named = [node for node in nodes if not node["ignored"] and node["role"]["value"] in NAMED]
+    unnamed = [node for node in named if not node.get("name", {}).get("value", "").strip()]
+    assert len(named) > 300 and not unnamed, unnamed[:5]
+    browser.call("Accessibility.disable")
+    browser.run("open.clear(); open.add('camera'); built = ''; showForm()")
+    for width, scheme in ((1024, "light"), (1024, "dark"), (1280, "light")):
+        browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+        browser.call("Emulation.setDeviceMetricsOverride", width=width, height=768, deviceScaleFactor=1, mobile=False)
+        outside = browser.run(f"""{FOCUSABLE}.filter((node) => {{
+            const {{ left, right }} = node.getBoundingClientRect();
+            return left < 0 || right > innerWidth;
+        }}).map((node) => node.outerHTML)""")
+        assert not outside, (width, outside)
+    browser.call("Emulation.clearDeviceMetricsOverride")
+    browser.call("Emulation.setEmulatedMedia", features=[])
+    count = browser.run(f"(window.order = {FOCUSABLE}).length")
+    browser.run("document.activeElement.blur(); getSelection().setPosition(document.body, 0)")
+    for k in range(count):
+        browser.press("Tab")
+        focused = "document.activeElement"
+        assert browser.run(f"{focused} === order[{k}]"), browser.run(f"[order[{k}].outerHTML, {focused}.outerHTML]")
+        style = browser.run(
+            f"(({{ outlineStyle, boxShadow }}) => [outlineStyle, boxShadow])(getComputedStyle({focused}.closest('.file') ?? {focused}))"
+        )
+        assert style != ["none", "none"], browser.run(f"{focused}.outerHTML")
+    browser.press("Tab")
+    assert not browser.run("order.slice(1).includes(document.activeElement)"), "the focus leaves the page"
+    browser.run("document.activeElement.blur()")
+
+
 TIMES = """(async () => {
     const wait = () => new Promise((resolve) => setTimeout(resolve));
     const own = show;
@@ -262,6 +378,8 @@ def main():
         assert browser.run("layers.get('nucleus').on && focus === 1.5 && state.index === 2")
         browser.picture(folder / "link.png")
         check_preset(browser)
+        check_match(browser, program, folder)
+        check_access(browser)
         browser.check(served.address)
     finally:
         browser.close()

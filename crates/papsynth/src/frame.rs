@@ -1,5 +1,7 @@
 //! The output of an engine: planes and their ground truth.
 
+use sha2::{Digest, Sha256};
+
 use crate::scene::Scene;
 use crate::truth::{Mask, Truth};
 
@@ -46,6 +48,20 @@ pub struct Frame {
 #[must_use]
 pub fn white_level(bits: u32) -> u16 {
     u16::MAX >> 16_u32.saturating_sub(bits.max(1)).min(15)
+}
+
+impl Plane {
+    /// Returns the SHA-256 of the [grey levels](Self::grey) in hexadecimal digits: of one byte per sample, or of two for
+    /// cameras with more than 8 bits, least byte first.
+    #[must_use]
+    pub fn sha256(&self, bits: u32) -> String {
+        let bytes = if bits > u8::BITS { 2 } else { 1 };
+        let mut hash = Sha256::new();
+        for row in self.grey.chunks(4096) {
+            hash.update(row.iter().flat_map(|level| level.to_le_bytes().into_iter().take(bytes)).collect::<Vec<_>>());
+        }
+        hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+    }
 }
 
 impl Finished {

@@ -40,7 +40,8 @@ use crate::transmit::{MicroscopeCache, TransmissionStats, empty_light};
 pub struct Cancellation(Arc<AtomicBool>);
 
 impl Cancellation {
-    /// Cancels the images that use this flag. They stop after the current objects.
+    /// Cancels the images that use this flag. They stop after the current objects, or
+    /// after the current transform of Abbe's integration.
     pub fn cancel(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
@@ -269,7 +270,9 @@ impl Live {
                     None => drawn.next(),
                 };
                 let phantoms: Vec<Phantom> = kept.iter().filter_map(phantom).collect();
-                Parts::new(scene, phantoms, &self.microscopes, work)
+                let parts = Parts::new(scene, phantoms, &self.microscopes, work);
+                self.microscopes.forget_unused();
+                parts
             }
         }
     }

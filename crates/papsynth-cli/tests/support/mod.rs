@@ -221,13 +221,35 @@ pub(crate) struct Server {
 impl Server {
     /// The JSON reply to a GET request.
     pub(crate) fn get(&self, target: &str) -> serde_json::Value {
+        serde_json::from_slice(&self.send(&format!("GET {target}"), "", &[])).unwrap()
+    }
+
+    /// The body of the reply to a POST request.
+    pub(crate) fn post(&self, target: &str, content_type: &str, body: &[u8]) -> Vec<u8> {
+        self.send(&format!("POST {target}"), &format!("Content-Type: {content_type}\r\n"), body)
+    }
+
+    fn send(&self, line: &str, headers: &str, body: &[u8]) -> Vec<u8> {
         use std::io::{Read, Write};
         let mut stream = std::net::TcpStream::connect(("127.0.0.1", self.port)).unwrap();
-        let request = format!("GET {target} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nConnection: close\r\n\r\n", self.port);
-        stream.write_all(request.as_bytes()).unwrap();
-        let mut reply = String::new();
-        stream.read_to_string(&mut reply).unwrap();
-        serde_json::from_str(reply.split("\r\n\r\n").nth(1).unwrap()).unwrap()
+        let (port, length) = (self.port, body.len());
+        let head = format!(
+            "{line} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nConnection: close\r\n{headers}Content-Length: {length}\r\n\r\n"
+        );
+        stream.write_all(head.as_bytes()).unwrap();
+        stream.write_all(body).unwrap();
+        let mut reply = Vec::new();
+        stream.read_to_end(&mut reply).unwrap();
+        let end = reply.windows(4).position(|four| four == b"\r\n\r\n").unwrap();
+        reply.split_off(end + 4)
+    }
+
+    /// Peak memory of the process, bytes.
+    #[cfg(target_os = "linux")]
+    pub(crate) fn peak_bytes(&self) -> u64 {
+        let status = fs::read_to_string(format!("/proc/{}/status", self.child.id())).unwrap();
+        let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap();
+        1024 * line.trim().strip_suffix("kB").unwrap().trim().parse::<u64>().unwrap()
     }
 
     /// Ends the run like Ctrl-C and returns its exit code.

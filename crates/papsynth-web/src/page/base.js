@@ -4,7 +4,10 @@
 
 const element = (id) => document.getElementById(id);
 
-/** Sends a request. Throws the message of the server with its status, or an error without a status if it does not respond. */
+/** Passes a request to the server, or to the engine of a page without a server, and returns the response. */
+let send = (path, options) => fetch(path, options);
+
+/** Sends a request. Throws the message of the reply with its status, or an error without a status if there is none. */
 async function request(path, body) {
   const options = { cache: "no-store" };
   if (body !== undefined) {
@@ -12,7 +15,7 @@ async function request(path, body) {
     options.headers = { "Content-Type": "application/json" };
     options.body = JSON.stringify(body);
   }
-  const response = await fetch(path, options);
+  const response = await send(path, options);
   if (response.ok) return response;
   const { error } = await response.json().catch(() => ({ error: response.statusText }));
   throw Object.assign(new Error(error), { status: response.status });

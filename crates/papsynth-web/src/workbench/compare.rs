@@ -1,7 +1,5 @@
 //! The comparison of an image with that of the user, as the judge measures them.
 
-use std::sync::{Mutex, PoisonError};
-
 use papsynth::white_level;
 use papsynth_judge::{Detail, FieldImage, Measurer, MeasurerParams, Statistics, describe, frequencies};
 use serde::Deserialize;
@@ -17,38 +15,30 @@ use crate::server::Reply;
 pub(super) struct CompareRequest {
     /// Number of the image.
     id: usize,
+    /// Number of the image of the user.
+    pub(super) real: usize,
     /// Pixel size of the image of the user, µm.
     pixel_um: f64,
 }
 
-/// Grey levels of one channel.
+/// Grey levels of an image, channels interleaved.
 pub(super) struct Grey<'a> {
     pub(super) levels: &'a [u16],
     pub(super) channels: usize,
     pub(super) width: usize,
     pub(super) bits: u32,
-    /// Pixel size, µm.
-    pub(super) pixel_um: f64,
+}
+
+impl<'a> Grey<'a> {
+    pub(super) fn of(RealImage { image, bits }: &'a RealImage) -> Self {
+        Self { levels: &image.levels, channels: image.channels, width: image.width, bits: *bits }
+    }
 }
 
 /// Returns the statistics of both images. The image with smaller pixels is resampled, so that both have the same.
-pub(super) fn compared(
-    asked: &CompareRequest,
-    renderer: &Renderer,
-    real: &Mutex<Option<RealImage>>,
-) -> Result<Reply, Reply> {
-    let (ours, own_um) = renderer.with_grey(asked.id, |grey| (field_image(grey), grey.pixel_um))?;
-    let theirs = {
-        let real = real.lock().unwrap_or_else(PoisonError::into_inner);
-        let RealImage { image, bits } = real.as_ref().ok_or_else(|| Reply::error(404, "no image to compare with"))?;
-        field_image(&Grey {
-            levels: &image.levels,
-            channels: image.channels,
-            width: image.width,
-            bits: *bits,
-            pixel_um: asked.pixel_um,
-        })
-    };
+pub(super) fn compared(asked: &CompareRequest, renderer: &Renderer, real: &RealImage) -> Result<Reply, Reply> {
+    let (ours, own_um) = renderer.with_grey(asked.id, |grey, pixel_um| (field_image(grey), pixel_um))?;
+    let theirs = field_image(&Grey::of(real));
     let invalid = |error: papsynth_judge::Error| Reply::error(422, &error.to_string());
     let pixel_um = asked.pixel_um.max(own_um);
     let params = MeasurerParams { pixel_um, detail: Detail::Statistics, ..MeasurerParams::default() };
@@ -62,11 +52,16 @@ pub(super) fn compared(
     Ok(Reply::json(&report(&ours, &theirs, pixel_um)))
 }
 
-/// Returns one channel, the green one of three.
-fn field_image(grey: &Grey<'_>) -> FieldImage {
-    let first = if grey.channels == 3 { 1 } else { 0 };
-    let levels = grey.levels.iter().skip(first).step_by(grey.channels.max(1)).map(|&level| f32::from(level)).collect();
-    FieldImage { grey: levels, width: grey.width, full_scale: white_level(grey.bits).into(), ..FieldImage::default() }
+/// Returns the grey levels, of three channels the green ones.
+pub(super) fn field_image(grey: &Grey<'_>) -> FieldImage {
+    let green = usize::from(grey.channels == 3);
+    let full_scale = white_level(grey.bits).into();
+    FieldImage { grey: channel(grey, green), width: grey.width, full_scale, ..FieldImage::default() }
+}
+
+/// Returns the grey levels of a channel.
+pub(super) fn channel(grey: &Grey<'_>, number: usize) -> Vec<f32> {
+    grey.levels.iter().skip(number).step_by(grey.channels.max(1)).map(|&level| f32::from(level)).collect()
 }
 
 fn report(ours: &Statistics, theirs: &Statistics, pixel_um: f64) -> Value {

@@ -3,12 +3,16 @@
 mod colouring;
 #[cfg(feature = "judge")]
 mod compare;
+#[cfg(feature = "match")]
+mod matching;
 mod real;
 mod recipes;
 mod rendering;
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
+use papsynth::key::STREAM_VERSION;
 use papsynth::model::Model;
 use papsynth::recipe::{CameraPreset, Preset, Recipe};
 use papsynth::truth::Group;
@@ -21,10 +25,10 @@ use crate::page::{self, CSS, File, HTML, JS};
 use crate::server::{Reply, Request, Site, SlowReply};
 use crate::view::{excerpt, number};
 use colouring::Colouring;
-use real::RealImage;
-use rendering::{RenderRequest, Renderer};
+use real::{RealImage, RealImages};
+use rendering::{RenderRequest, Renderer, locked};
 
-const PAGE: [File; 9] = [
+const PAGE: [File; 10] = [
     ("/", HTML, include_str!("page/index.html")),
     ("/workbench.css", CSS, include_str!("page/workbench.css")),
     ("/recipe.js", JS, include_str!("page/recipe.js")),
@@ -32,6 +36,7 @@ const PAGE: [File; 9] = [
     ("/form.js", JS, include_str!("page/form.js")),
     ("/picture.js", JS, include_str!("page/picture.js")),
     ("/real.js", JS, include_str!("page/real.js")),
+    ("/match.js", JS, include_str!("page/match.js")),
     ("/output.js", JS, include_str!("page/output.js")),
     ("/workbench.js", JS, include_str!("page/workbench.js")),
 ];
@@ -41,6 +46,13 @@ const MAX_RECIPE: usize = 1 << 20;
 
 /// Maximum length of an image in a request, bytes.
 const MAX_IMAGE: usize = 1 << 27;
+
+/// Fraction of the memory for the images of the user.
+const REAL_MEMORY: f64 = 0.15;
+
+/// Fraction of the memory for the fields of a match.
+#[cfg(feature = "match")]
+const MATCH_MEMORY: f64 = 0.3;
 
 /// What a workbench starts with.
 #[derive(Debug, Clone)]
@@ -59,14 +71,27 @@ pub struct WorkbenchParams {
     pub threads: Threads,
     /// Memory for images, bytes; `None` for no limit.
     pub max_memory: Option<u64>,
+    /// Time since any start, for the times that the page shows; no pixel depends on it.
+    pub clock: fn() -> Duration,
+    /// Images that the page already has from an earlier workbench: the numbers of images continue.
+    pub images_before: usize,
 }
 
 /// The workbench: replies to the requests of its page.
 pub struct Workbench {
     params: WorkbenchParams,
     renderer: Arc<Renderer>,
-    /// The image of the user.
-    real: Arc<Mutex<Option<RealImage>>>,
+    /// The images of the user.
+    real: Arc<Mutex<RealImages>>,
+    #[cfg(feature = "match")]
+    matching: Arc<matching::Matching>,
+}
+
+/// An image of the user.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RemoveRequest {
+    id: usize,
 }
 
 /// The text of a recipe.
@@ -91,8 +116,21 @@ impl Workbench {
     /// # Errors
     /// If the model is invalid.
     pub fn new(params: WorkbenchParams) -> Result<Self, Error> {
+        let part = |fraction: f64| {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a fraction of a size")]
+            params.max_memory.map(|bytes| (bytes as f64 * fraction) as u64)
+        };
         let renderer = Arc::new(Renderer::new(&params)?);
-        Ok(Self { params, renderer, real: Arc::default() })
+        let real = Arc::new(Mutex::new(RealImages::within(part(REAL_MEMORY))));
+        #[cfg(feature = "match")]
+        let matching = Arc::new(matching::Matching::new(&params, part(MATCH_MEMORY)));
+        Ok(Self {
+            #[cfg(feature = "match")]
+            matching,
+            params,
+            renderer,
+            real,
+        })
     }
 
     /// Returns all that the page needs before the first image.
@@ -102,11 +140,13 @@ impl Workbench {
         let camera = |camera: CameraPreset| json!({ "name": camera.name(), "summary": camera.summary(), "camera": camera.camera() });
         Reply::json(&json!({
             "version": env!("CARGO_PKG_VERSION"),
+            "stream_version": STREAM_VERSION,
             "schema": Recipe::schema(),
             "presets": Preset::ALL.map(preset),
             "cameras": CameraPreset::ALL.map(camera),
             "classes": self.params.model.classes.keys().collect::<Vec<_>>(),
             "compares": cfg!(feature = "judge"),
+            "matches": cfg!(feature = "match"),
             "groups": Group::ALL.map(Group::name),
             "preset": self.params.preset.name(),
             "recipe": self.params.recipe,
@@ -127,8 +167,30 @@ impl Workbench {
                 let text = if commented { recipe.to_commented_toml() } else { recipe.to_toml() };
                 Ok(Reply::json(&json!({ "text": text })))
             }
+            ("POST", ["cancel"]) => {
+                self.renderer.cancel();
+                Ok(Reply::json(&json!({})))
+            }
+            ("POST", ["real", "remove"]) => {
+                let RemoveRequest { id } = request.json()?;
+                locked(&self.real).remove(id);
+                Ok(Reply::json(&json!({})))
+            }
+            #[cfg(feature = "match")]
+            ("GET", ["match"]) => Ok(self.matching.state()),
+            #[cfg(feature = "match")]
+            ("POST", ["match"]) => self.matching.start(&request.json_within(MAX_RECIPE)?, &self.real),
+            #[cfg(feature = "match")]
+            ("POST", ["match", "cancel"]) => Ok(self.matching.stop()),
+            #[cfg(feature = "match")]
+            ("POST", ["match", "estimate"]) => {
+                let asked = request.json_within(MAX_RECIPE)?;
+                Ok(Reply::json(&self.matching.estimate(&asked, &self.real, self.renderer.pace())?))
+            }
             (_, ["info" | "at" | "labels" | "legend" | "image.png" | "mask", ..]) => Err(Reply::wrong_method("GET")),
-            (_, ["check" | "compare" | "print" | "real" | "render", ..]) => Err(Reply::wrong_method("POST")),
+            (_, ["cancel" | "check" | "compare" | "match" | "print" | "real" | "render", ..]) => {
+                Err(Reply::wrong_method("POST"))
+            }
             _ => Err(Reply::error(404, "not found")),
         }
     }
@@ -147,7 +209,7 @@ impl Workbench {
             #[cfg(feature = "judge")]
             ("POST", ["compare"]) => {
                 let asked: compare::CompareRequest = request.json()?;
-                let real = Arc::clone(&self.real);
+                let real = locked(&self.real).get(asked.real)?;
                 Some(Box::new(move || compare::compared(&asked, &renderer, &real).unwrap_or_else(|error| error)))
             }
             ("GET", ["at", id, x, y]) => {
@@ -163,14 +225,11 @@ impl Workbench {
                 Some(Box::new(move || renderer.legend(id, by, group).unwrap_or_else(|error| error)))
             }
             ("POST", ["real"]) => {
-                let (image, real) = (RealImage::encoded(request)?, Arc::clone(&self.real));
+                let (file, real) = (RealImage::encoded(request)?, Arc::clone(&self.real));
                 Some(Box::new(move || {
-                    let decoded = RealImage::decode(&image).map(|image| {
-                        let reply = image.reply();
-                        *real.lock().unwrap_or_else(PoisonError::into_inner) = Some(image);
-                        reply
-                    });
-                    decoded.unwrap_or_else(|error| error)
+                    let limits = locked(&real).limits();
+                    let image = RealImage::decode(&file, &limits);
+                    image.and_then(|image| locked(&real).add(image)).unwrap_or_else(|error| error)
                 }))
             }
             ("GET", ["mask", id, group]) => {

@@ -1,7 +1,7 @@
 //! Images of the workbench: one at a time, the most recent request first.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::Duration;
 
 use papsynth::key::Key;
 use papsynth::live::{Cancellation, Live, LiveImage};
@@ -46,19 +46,21 @@ pub(super) enum ImageKind {
     Full,
     /// Half the resolution.
     Reduced,
-    /// A quarter of the resolution, for a row of small images.
+    /// A quarter of the resolution.
+    Coarse,
+    /// The same for a row of small images.
     Small,
 }
 
 impl ImageKind {
-    const ALL: [Self; 3] = [Self::Full, Self::Reduced, Self::Small];
+    const ALL: [Self; 4] = [Self::Full, Self::Reduced, Self::Coarse, Self::Small];
 
     /// Returns the size of its pixels relative to the image.
     fn factor(self) -> usize {
         match self {
             Self::Full => 1,
             Self::Reduced => 2,
-            Self::Small => 4,
+            Self::Coarse | Self::Small => 4,
         }
     }
 }
@@ -74,17 +76,20 @@ pub(super) struct Renderer {
     model: Model,
     threads: Threads,
     max_memory: Option<u64>,
+    clock: fn() -> Duration,
     /// The images in progress or waiting.
     pending: Mutex<Vec<Cancellation>>,
     sessions: Mutex<Sessions>,
     /// The last complete image.
     shown: Mutex<Option<Shown>>,
+    /// Time of a pixel of the last image of full resolution of which nothing was kept, s.
+    pace: Mutex<f64>,
 }
 
 /// A session for each kind of image, because each has its own pixels.
 struct Sessions {
     lives: [Live; ImageKind::ALL.len()],
-    /// Number of complete images.
+    /// Number of complete images; the id of the last one.
     count: usize,
 }
 
@@ -107,26 +112,32 @@ impl Renderer {
             }
             Ok::<_, papsynth::Error>(live)
         };
-        let lives = [live()?, live()?, live()?];
+        let lives = [live()?, live()?, live()?, live()?];
         Ok(Self {
             model: params.model.clone(),
             threads: params.threads,
             max_memory: params.max_memory,
+            clock: params.clock,
             pending: Mutex::default(),
-            sessions: Mutex::new(Sessions { lives, count: 0 }),
+            sessions: Mutex::new(Sessions { lives, count: params.images_before }),
             shown: Mutex::default(),
+            pace: Mutex::default(),
         })
+    }
+
+    /// Cancels all images in progress.
+    pub(super) fn cancel(&self) {
+        locked(&self.pending).drain(..).for_each(|earlier| earlier.cancel());
     }
 
     /// Cancels the images that a new image replaces, and returns the flag of the new one.
     pub(super) fn begin(&self, asked: &RenderRequest) -> Cancellation {
-        let mut pending = locked(&self.pending);
         // Small images wait for the others; a change cancels all.
         if asked.view != ImageKind::Small {
-            pending.drain(..).for_each(|earlier| earlier.cancel());
+            self.cancel();
         }
         let cancellation = Cancellation::default();
-        pending.push(cancellation.clone());
+        locked(&self.pending).push(cancellation.clone());
         cancellation
     }
 
@@ -147,11 +158,14 @@ impl Renderer {
         if cancellation.is_cancelled() {
             return header(&json!({ "cancelled": true }));
         }
-        let start = now();
+        let start = (self.clock)();
         match image(&mut sessions.lives[asked.view as usize], asked, self.threads, cancellation) {
             Ok((scene, planes_um, LiveImage { mut planes, made })) => {
                 let Some(plane) = planes.pop() else { return Reply::error(500, "the image has no plane") };
-                let ms = start.elapsed().as_secs_f64() * 1e3;
+                let seconds = (self.clock)().saturating_sub(start).as_secs_f64();
+                if asked.view == ImageKind::Full && made.phantoms == scene.objects.len() {
+                    *locked(&self.pace) = seconds / (scene.view.width * scene.view.height) as f64;
+                }
                 sessions.count += 1;
                 let (id, bits) = (sessions.count, scene.camera.bits);
                 let head = json!({
@@ -169,7 +183,8 @@ impl Renderer {
                     "cells": scene.cells.values().map(|count| count.in_field).sum::<u64>(),
                     "unplaced": scene.unplaced(),
                     "saturated_px": plane.saturated.area(),
-                    "ms": ms,
+                    "ms": seconds * 1e3,
+                    "sha256": (asked.view == ImageKind::Full).then(|| plane.sha256(bits)),
                     "made": { "phantoms": made.phantoms, "planes": made.planes, "background": made.background },
                 });
                 let reply = match asked.noise_free {
@@ -189,6 +204,12 @@ impl Renderer {
             }
             Err(error) => header(&json!({ "errors": [{ "path": [], "message": error.to_string() }] })),
         }
+    }
+
+    /// Returns the time of a pixel of the last image of full resolution of which nothing was kept, s.
+    #[cfg(feature = "match")]
+    pub(super) fn pace(&self) -> f64 {
+        *locked(&self.pace)
     }
 
     /// Returns a message if the image of a recipe needs too much memory.
@@ -222,23 +243,19 @@ impl Renderer {
         }
     }
 
-    /// Passes the grey levels of the last complete image to `work`, if it has this number.
+    /// Passes the grey levels and the pixel size (µm) of the last complete image to `work`, if it has this number.
     #[cfg(feature = "judge")]
     pub(super) fn with_grey<T>(
         &self,
         id: usize,
-        work: impl FnOnce(&super::compare::Grey<'_>) -> T,
+        work: impl FnOnce(&super::compare::Grey<'_>, f64) -> T,
     ) -> Result<T, Reply> {
         let shown = locked(&self.shown);
         let shown = shown.as_ref().filter(|shown| shown.id == id);
         let Shown { plane, scene, .. } = shown.ok_or_else(gone)?;
-        Ok(work(&super::compare::Grey {
-            levels: &plane.grey,
-            channels: plane.channels,
-            width: scene.view.width,
-            bits: scene.camera.bits,
-            pixel_um: scene.view.pixel_um,
-        }))
+        let (channels, width, bits) = (plane.channels, scene.view.width, scene.camera.bits);
+        let grey = super::compare::Grey { levels: &plane.grey, channels, width, bits };
+        Ok(work(&grey, scene.view.pixel_um))
     }
 
     /// Returns the objects at a pixel, the nearest to the objective first.
@@ -343,12 +360,7 @@ pub(super) fn framed(head: &Value, samples: &[u16], bits: u32) -> Reply {
     Reply::binary(body)
 }
 
-#[expect(clippy::disallowed_methods, reason = "the page shows how long an image takes; no pixel depends on it")]
-fn now() -> Instant {
-    Instant::now()
-}
-
 /// Locks a mutex, also after a panic in another request: one request must not stop the server.
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub(super) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

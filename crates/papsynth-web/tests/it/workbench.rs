@@ -1,7 +1,9 @@
 //! The workbench without a browser: its replies, and its pixels against those of an engine.
 
 use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
+use std::time::Duration;
 
 use papsynth::key::Key;
 use papsynth::live::Live;
@@ -17,7 +19,15 @@ use crate::support::view::{Pixels, recipe};
 fn workbench(recipe: Recipe, max_memory: Option<u64>) -> Workbench {
     let (model, inputs) = (Model::builtin(), Inputs::default());
     let (preset, threads) = (Preset::Lbc, Threads::All);
-    Workbench::new(WorkbenchParams { recipe, preset, model, inputs, seed: 5, threads, max_memory }).unwrap()
+    let params =
+        WorkbenchParams { recipe, preset, model, inputs, seed: 5, threads, max_memory, clock, images_before: 0 };
+    Workbench::new(params).unwrap()
+}
+
+/// A millisecond later at each call.
+fn clock() -> Duration {
+    static CALLS: AtomicU64 = AtomicU64::new(0);
+    Duration::from_millis(CALLS.fetch_add(1, Ordering::Relaxed))
 }
 
 /// Replies as the server does.
@@ -137,6 +147,9 @@ fn a_new_image_cancels_the_earlier_ones() {
     let threads = works.map(|work| thread::spawn(move || unframed(&work()).0["cancelled"] == true));
     let cancelled = threads.map(|thread| thread.join().unwrap());
     assert_eq!(cancelled, [true, true, true, false, false]);
+    let work = begin("full");
+    post(&mut workbench, "/cancel", &json!({}));
+    assert_eq!(unframed(&work()).0["cancelled"], true);
 }
 
 #[test]
@@ -179,19 +192,24 @@ fn images_of_the_user_are_decoded_in_memory() {
     let content_type = Some(&b"application/octet-stream"[..]);
     let reply = ask(&mut workbench, &Request { method: "POST", target: "/real", content_type, body: &file });
     let (real, pixels) = unframed(&reply);
+    assert_eq!(real["id"], 1);
     assert_eq!((&real["width"], &real["channels"], &real["bits"]), (&json!(300), &json!(1), &json!(8)));
     assert_eq!(pixels, samples);
     #[cfg(feature = "judge")]
     {
         // An image does not differ from itself.
-        let found = json_of(&post(&mut workbench, "/compare", &json!({ "id": head["id"], "pixel_um": 0.25 })));
+        let found =
+            json_of(&post(&mut workbench, "/compare", &json!({ "id": head["id"], "real": 1, "pixel_um": 0.25 })));
         let scalars = found["scalars"].as_array().unwrap();
         assert!(scalars.len() > 5 && scalars.iter().all(|scalar| scalar["difference"] == 0.0), "{found}");
         assert_eq!(found["spectrum"]["ours"], found["spectrum"]["theirs"]);
-        let gone = post(&mut workbench, "/compare", &json!({ "id": 99, "pixel_um": 0.25 }));
+        let gone = post(&mut workbench, "/compare", &json!({ "id": 99, "real": 1, "pixel_um": 0.25 }));
         assert_eq!(gone.status, 404);
-        let wrong = post(&mut workbench, "/compare", &json!({ "id": head["id"], "pixel_um": 99.0 }));
+        let wrong = post(&mut workbench, "/compare", &json!({ "id": head["id"], "real": 1, "pixel_um": 99.0 }));
         assert_eq!(wrong.status, 422);
+        assert_eq!(post(&mut workbench, "/real/remove", &json!({ "id": 1 })).status, 200);
+        let gone = post(&mut workbench, "/compare", &json!({ "id": head["id"], "real": 1, "pixel_um": 0.25 }));
+        assert_eq!(gone.status, 404);
     }
     // A page of another site can send text without asking.
     let content_type = Some(&b"text/plain"[..]);
@@ -200,6 +218,71 @@ fn images_of_the_user_are_decoded_in_memory() {
     let content_type = Some(&b"application/octet-stream"[..]);
     let reply = ask(&mut workbench, &Request { method: "POST", target: "/real", content_type, body: b"no image" });
     assert_eq!(reply.status, 422);
+}
+
+/// Waits for the end of the match, and returns the last reply.
+#[cfg(feature = "match")]
+fn ended(workbench: &mut Workbench) -> Value {
+    loop {
+        let state = json_of(&get(workbench, "/match"));
+        if state["state"] != "running" {
+            return state;
+        }
+        assert!(state["done"].as_u64() <= state["total"].as_u64(), "{state}");
+        thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[cfg(feature = "match")]
+#[test]
+fn a_match_finds_a_recipe_for_the_images_of_the_user() {
+    let mut recipe = recipe("[slide]\nfields_per_slide = 1\n[background]\nlevel = 0.8\ntexture = 0.004\n");
+    recipe.field.pixel_um = 0.5.into();
+    for (name, count) in [("intermediate", 5.0), ("superficial", 2.0)] {
+        recipe.cells.get_mut(name).unwrap().count = count.into();
+    }
+    let mut workbench = workbench(recipe.clone(), Some(1 << 30));
+    let request = |images: &[u64], quick: bool| {
+        let images: Vec<Value> = images.iter().map(|id| json!({ "id": id, "name": format!("field {id}") })).collect();
+        json!({ "recipe": Preset::Lbc.recipe(), "images": images, "pixel_um": 0.5, "quick": quick })
+    };
+    for index in 0..3 {
+        let mut asked = asked(&recipe, "full");
+        asked["index"] = index.into();
+        let (head, _) = unframed(&post(&mut workbench, "/render", &asked));
+        let file = get(&mut workbench, &format!("/image.png/{}", head["id"])).body;
+        let content_type = Some(&b"application/octet-stream"[..]);
+        ask(&mut workbench, &Request { method: "POST", target: "/real", content_type, body: &file });
+    }
+    assert_eq!(json_of(&get(&mut workbench, "/match"))["state"], "none");
+    let [quick, whole] =
+        [true, false].map(|quick| json_of(&post(&mut workbench, "/match/estimate", &request(&[1, 2, 3], quick))));
+    assert!(quick["seconds"].as_f64() > Some(0.0) && quick["seconds"].as_f64() < whole["seconds"].as_f64(), "{whole}");
+    // Errors of the match are those of the library.
+    post(&mut workbench, "/match", &request(&[2], true));
+    let failed = ended(&mut workbench);
+    assert_eq!(
+        (&failed["state"], failed["error"].as_str().unwrap().starts_with("1 field for a match")),
+        (&json!("failed"), true)
+    );
+    assert_eq!(post(&mut workbench, "/match", &request(&[9], true)).status, 404);
+    let mut wrong = request(&[1, 2], true);
+    wrong["pixel_um"] = 99.0.into();
+    assert_eq!(post(&mut workbench, "/match", &wrong).status, 422);
+    // A match that is cancelled.
+    assert_eq!(json_of(&post(&mut workbench, "/match", &request(&[1, 2, 3], false)))["state"], "running");
+    assert_eq!(json_of(&post(&mut workbench, "/match/cancel", &json!({})))["state"], "none");
+    assert_eq!(json_of(&get(&mut workbench, "/match"))["state"], "none");
+    post(&mut workbench, "/match", &request(&[1, 2, 3], true));
+    let done = ended(&mut workbench);
+    assert_eq!(done["state"], "done", "{done}");
+    let level = done["fit"]["parameters"].as_array().unwrap().iter().find(|p| p["parameter"] == "level").unwrap();
+    assert!((level["value"].as_f64().unwrap() - 0.8).abs() < 0.03, "{level}");
+    assert_eq!(done["fit"]["simulated"], quick["simulated"]);
+    let found: Recipe = serde_json::from_value(done["recipe"].clone()).unwrap();
+    assert_eq!(found.conditions.len(), 3);
+    let (head, _) = unframed(&post(&mut workbench, "/render", &asked(&found, "full")));
+    assert_eq!((&head["width"], &head["pixel_um"]), (&json!(300), &json!(0.5)));
 }
 
 #[test]
@@ -229,6 +312,7 @@ fn the_page_and_unknown_requests() {
         ("GET", "/image.png/7", 404),
         ("POST", "/render", 415),
         ("POST", "/check", 415),
+        ("POST", "/real/remove", 415),
     ] {
         assert_eq!(ask(&mut workbench, &Request { method, target, ..Request::default() }).status, status, "{target}");
     }

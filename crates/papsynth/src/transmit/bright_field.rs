@@ -53,17 +53,25 @@ struct ObjectPatches {
 
 /// Buffers that are reused from object to object.
 #[derive(Debug, Default)]
-pub(super) struct PatchBuffers {
+pub(super) struct SpareBuffers {
+    /// One for each thread.
+    patches: Mutex<Vec<PatchBuffers>>,
+    /// Images, which wait until they are combined in the order of the objects.
+    factors: Mutex<Vec<Vec<Factor>>>,
+}
+
+/// Buffers to image an object.
+#[derive(Debug, Default)]
+struct PatchBuffers {
     transmission: ObjectTransmission,
     object_patches: ObjectPatches,
     scratch: PatchScratch,
-    factors: Vec<Factor>,
     refocused: Factor,
 }
 
 /// The images of an object in the lights of a group, in one plane.
 struct ObjectFactors {
-    buffers: PatchBuffers,
+    factors: Vec<Factor>,
     window: Window,
     /// For each light, the mean absorbance over the mask of each piece.
     absorbances: Vec<Vec<f64>>,
@@ -105,7 +113,7 @@ impl BrightFieldPath {
         light: &mut LightBuffers,
     ) -> Result<TransmissionStats, ErrorKind> {
         let View { width, height, .. } = specimen.scene.view;
-        let LightBuffers { channels, lights, images: light_images, patches, .. } = light;
+        let LightBuffers { channels, lights, images: light_images, spare, .. } = light;
         let is_sum = self.groups.len() > 1;
         if is_sum {
             channels.iter_mut().for_each(|channel| clear(channel, width * height));
@@ -117,7 +125,7 @@ impl BrightFieldPath {
             for (light, of) in lights.iter_mut().zip(&group.lights) {
                 light.reset(of.imager.microscope(), width, height);
             }
-            let absorbances = self.transmit_group(specimen, focus, group, patches, lights, &mut stats.clipped_px)?;
+            let absorbances = self.transmit_group(specimen, focus, group, spare, lights, &mut stats.clipped_px)?;
             let exact = self.optics.imaging == Imaging::Abbe;
             if let (true, FocusAt::Stage(stage_um)) = (exact, focus) {
                 // The multislice image replaces the product.
@@ -173,7 +181,7 @@ impl BrightFieldPath {
         specimen: Specimen<'_>,
         focus: FocusAt,
         group: &LightGroup,
-        spare: &Mutex<Vec<PatchBuffers>>,
+        spare: &SpareBuffers,
         lights: &mut [optics_psf::TransmittedLight],
         clipped_px: &mut usize,
     ) -> Result<Vec<Vec<f64>>, ErrorKind> {
@@ -191,13 +199,13 @@ impl BrightFieldPath {
                     return Ok(());
                 };
                 let at_px = object_factors.window.origin;
-                let factors = object_factors.buffers.factors.iter().zip(&object_factors.absorbances);
+                let factors = object_factors.factors.iter().zip(&object_factors.absorbances);
                 for ((light, absorbances), (factor, own)) in lights.iter_mut().zip(&mut absorbances).zip(factors) {
                     light.multiply(factor, at_px);
                     *clipped_px += factor.clipped;
                     absorbances.extend(own);
                 }
-                locked(spare).push(object_factors.buffers);
+                locked(&spare.factors).push(object_factors.factors);
                 Ok::<_, ErrorKind>(())
             },
         )?;
@@ -230,7 +238,7 @@ impl BrightFieldPath {
         index: usize,
         at: FocusAt,
         group: &LightGroup,
-        spare: &Mutex<Vec<PatchBuffers>>,
+        spare: &SpareBuffers,
     ) -> Result<Option<ObjectFactors>, ErrorKind> {
         specimen.work.cancellation.check()?;
         let (object, phantom) = (&specimen.scene.objects[index], &specimen.phantoms[index]);
@@ -259,8 +267,9 @@ impl BrightFieldPath {
         // Frames of a slide have the same pixels where they overlap.
         let is_cropped = specimen.scene.frame.is_none() && margin_px <= CROPPED_PX;
         let window = if is_cropped { visible_part(&phantom.pieces, window, n, specimen.scene.view) } else { window };
-        let mut buffers = locked(spare).pop().unwrap_or_default();
-        let PatchBuffers { transmission, object_patches, scratch, factors, refocused } = &mut buffers;
+        let mut buffers = locked(&spare.patches).pop().unwrap_or_default();
+        let PatchBuffers { transmission, object_patches, scratch, refocused } = &mut buffers;
+        let mut factors = locked(&spare.factors).pop().unwrap_or_default();
         let mut cached_patches = self.cached_patches.as_ref().map(|cached_patches| locked(&cached_patches[index]));
         let object_patches = match cached_patches.as_deref_mut() {
             Some(cached_patches) => {
@@ -293,12 +302,13 @@ impl BrightFieldPath {
             }
         }
         drop(cached_patches);
+        locked(&spare.patches).push(buffers);
         let absorbances = factors.iter().enumerate().map(|(light, factor)| {
             let of_piece = |(piece, fraction): (&Piece, &f64)| fraction * mean_absorbance(&piece.mask, factor, window);
             phantom.pieces.iter().zip(&group.fractions[index][light]).map(of_piece).collect()
         });
         let absorbances = absorbances.collect();
-        Ok(Some(ObjectFactors { buffers, window, absorbances }))
+        Ok(Some(ObjectFactors { factors, window, absorbances }))
     }
 
     fn fill_patches(
@@ -379,7 +389,8 @@ fn abbe_image(
         AbbeParams { width: size[0], height: size[1], source: Source::Vogel { points: optics.directions as usize } };
     let abbe = Abbe::new(microscope, &params).map_err(|error| ErrorKind::Optics("optics.directions", error))?;
     let layers = layers(specimen, optics.slab_um, light, frame)?;
-    let full = abbe.image(&layers, stage_um)?;
+    let goes_on = || !specimen.work.cancellation.is_cancelled();
+    let full = abbe.image_while(&layers, stage_um, &goes_on)?.ok_or(ErrorKind::Cancelled)?;
     let n = microscope.params().oversampling;
     let pixel = |x: usize, y: usize| {
         let rows = (margin + n * y..margin + n * (y + 1)).map(|row| &full[row * size[0] + margin + n * x..][..n]);
@@ -405,6 +416,7 @@ fn layers(
     let n = specimen.scene.oversampling();
     let mut slabs: BTreeMap<i64, Vec<[f64; 2]>> = BTreeMap::new();
     for (object, phantom) in specimen.scene.objects.iter().zip(specimen.phantoms) {
+        specimen.work.cancellation.check()?;
         let Some(window) = Window::around(phantom.pieces.iter(), n) else { continue };
         let window = window.sampled(n);
         let transmission = mixer.compose_on_grid(&phantom.pieces, window);

@@ -107,6 +107,12 @@ pub(crate) struct MicroscopeCache {
 }
 
 impl MicroscopeCache {
+    /// Removes the microscopes that no image uses.
+    pub(crate) fn forget_unused(&self) {
+        let mut cached = self.cached.lock().unwrap_or_else(PoisonError::into_inner);
+        cached.retain(|imager| Arc::strong_count(imager) > 1);
+    }
+
     /// Returns the microscope with these parameters.
     fn get(&self, params: &MicroscopeParams) -> Result<Arc<PatchImager>, ErrorKind> {
         let mut cached = self.cached.lock().unwrap_or_else(PoisonError::into_inner);

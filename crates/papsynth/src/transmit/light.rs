@@ -1,11 +1,9 @@
 //! Inputs and buffers of the optics, and the light of the empty slide.
 
-use std::sync::Mutex;
-
 use perlin_bg::{Background, BackgroundParams, BackgroundTexture, FractalParams, Illumination};
 use rand_core::Rng;
 
-use super::bright_field::PatchBuffers;
+use super::bright_field::SpareBuffers;
 use super::sensor_dust;
 use crate::error::ErrorKind;
 use crate::phantom::Phantom;
@@ -40,8 +38,8 @@ pub(crate) struct LightBuffers {
     pub(super) lights: Vec<optics_psf::TransmittedLight>,
     /// Image of each light of a group.
     pub(super) images: Vec<Vec<f32>>,
-    /// Buffers for single objects, one for each object imaged at the same time.
-    pub(super) patches: Mutex<Vec<PatchBuffers>>,
+    /// Buffers for single objects.
+    pub(super) spare: SpareBuffers,
     /// Rows of the light of the empty slide.
     pub(super) empty: Vec<f32>,
     pub(super) bands: Vec<Vec<f32>>,

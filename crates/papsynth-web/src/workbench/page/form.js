@@ -101,26 +101,32 @@ function fieldNode({ path, schema }, isLong) {
   reset.addEventListener("click", () => {
     const base = at(state.base, path);
     if (base !== undefined) edit(path, base);
+    // The button is hidden now.
+    node.querySelector("input, select")?.focus();
   });
   const help = made("p", [meaning, range ? made("span", ` ${range}`, "range") : ""], "help");
   help.id = `help-${(count += 1)}`;
+  const varies = made("p", "", "varies");
   const fault = made("p", "", "fault");
   fault.id = `fault-${count}`;
-  node.append(made("div", [text, editor.forms ?? "", reset], "head"), editor.node, help, fault);
+  node.append(made("div", [text, editor.forms ?? "", reset], "head"), editor.node, varies, help, fault);
   const update = () => {
     editor.update();
     const base = at(state.base, path);
-    const isChanged = base !== undefined && !equal(base, at(state.recipe, path));
+    const isChanged = base !== undefined && (!equal(base, at(state.recipe, path)) || conditionsAt(path).length > 0);
     node.classList.toggle("changed", isChanged || base === undefined);
     reset.hidden = !isChanged;
     if (isChanged) reset.title = `Reset to ${toml(base)}`;
+    const conditions = conditionsAt(path).length;
+    varies.hidden = conditions === 0;
+    varies.textContent = `Each of ${conditions} conditions has a value of its own; a change here replaces them.`;
     const message = faults.get(node.dataset.path);
     fault.textContent = message ?? "";
     fault.hidden = !message;
     node.classList.toggle("faulty", Boolean(message));
     for (const own of node.querySelectorAll("input, select")) {
       own.setAttribute("aria-describedby", message ? `${fault.id} ${help.id}` : help.id);
-      own.toggleAttribute("aria-invalid", Boolean(message));
+      own.setAttribute("aria-invalid", Boolean(message));
     }
     text.htmlFor = editor.node.id || `field-${node.dataset.path}`;
   };
@@ -240,8 +246,23 @@ function structure(value) {
 }
 let built = "";
 
-/** Builds the form, or updates its fields if no field was added or removed. */
+/** Returns a selector of a control of the form that also finds the one that replaces it. */
+function selectorOf(control) {
+  if (control.id) return `#${CSS.escape(control.id)}`;
+  const path = `[data-path="${CSS.escape(control.closest("[data-path]")?.dataset.path ?? "")}"]`;
+  return control.matches("summary") ? `${path} > summary` : `${path} [aria-label="${CSS.escape(control.ariaLabel ?? "")}"]`;
+}
+
+/** Shows the recipe in the form. The focus stays on its control, also if that is replaced. */
 function showForm() {
+  const focused = document.activeElement;
+  const selector = element("form").contains(focused) ? selectorOf(focused) : null;
+  updateForm();
+  if (selector && !focused.isConnected) element("form").querySelector(selector)?.focus();
+}
+
+/** Builds the form, or updates its fields if no field was added or removed. */
+function updateForm() {
   const words = element("search").value.toLowerCase().split(/\s+/).filter(Boolean);
   const onlyChanged = element("only-changed").checked;
   const names = onlyChanged ? differences(state.base, state.recipe).map(([path]) => dotted(path)) : null;
@@ -250,7 +271,6 @@ function showForm() {
     editors.forEach((update) => update());
     return;
   }
-  const focused = document.activeElement?.id;
   built = now;
   editors = [];
   // Fields are not scanned.
@@ -272,7 +292,6 @@ function showForm() {
     const none = onlyChanged && words.length === 0 ? "Nothing differs from the preset." : "No field matches.";
     element("form").replaceChildren(...(found.length ? found : [made("p", none, "quiet empty")]));
   }
-  if (focused) element(focused)?.focus();
 }
 
 /** Marks the fields with errors. */

@@ -43,6 +43,7 @@ element("save-masks").addEventListener("click", () => save(async () => {
   status("Label masks saved: the value of a pixel is the id of its object.");
 }));
 element("copy-command").addEventListener("click", () => copy(commandLine(), "Command"));
+element("copy-check").addEventListener("click", () => copy(checkLine(), "Command"));
 element("copy-python").addEventListener("click", () => copy(pythonLines(), "Python"));
 element("copy-link").addEventListener("click", () => {
   keepNow();
@@ -51,6 +52,9 @@ element("copy-link").addEventListener("click", () => {
 
 function showOutput() {
   element("command").textContent = commandLine();
+  element("check-command").textContent = checkLine();
+  // The command line has no option for a plane of a stack.
+  element("check").hidden = focus !== null && state.recipe.focus.planes !== 1;
   element("python").textContent = pythonLines();
 }
 

@@ -27,59 +27,97 @@ async function requestImage(kind, index) {
   return unframed(await (await request("render", body)).arrayBuffer());
 }
 
-/** Returns a canvas with the pixels of an image, 0 to the largest level as black to white. */
-function painted({ head, levels }) {
+/** Grey pixels of levels of 8 bits. */
+const GREYS = Uint32Array.from({ length: 256 }, (_, level) => 0xff000000 + level * 0x010101);
+
+/** Returns a canvas with the pixels of an image, 0 to the largest level as black to white. `old` is reused if it fits. */
+function painted({ head, levels }, old) {
   const { width, height, channels, bits } = head;
-  const own = new OffscreenCanvas(width, height);
+  const own = old?.width === width && old.height === height ? old : new OffscreenCanvas(width, height);
   const pixels = new ImageData(width, height);
   const words = new Uint32Array(pixels.data.buffer);
   const shift = Math.max(bits - 8, 0);
-  const alpha = 0xff000000;
   if (channels === 1) {
-    for (let i = 0; i < words.length; i += 1) {
-      const level = levels[i] >> shift;
-      words[i] = alpha | (level << 16) | (level << 8) | level;
-    }
+    for (let i = 0; i < words.length; i += 1) words[i] = GREYS[levels[i] >> shift];
   } else {
     for (let i = 0, k = 0; i < words.length; i += 1, k += 3) {
-      words[i] = alpha | ((levels[k + 2] >> shift) << 16) | ((levels[k + 1] >> shift) << 8) | (levels[k] >> shift);
+      const [red, green, blue] = [levels[k] >> shift, levels[k + 1] >> shift, levels[k + 2] >> shift];
+      words[i] = 0xff000000 | (blue << 16) | (green << 8) | red;
     }
   }
   own.getContext("2d").putImageData(pixels, 0, 0);
   return own;
 }
 
-// Rendering: the reduced image of the latest change first, then the image, then the small fields.
+// Rendering: a fast image of the latest change first, then the image, then the small fields.
 
 let dirty = false;
 let running = false;
-/** Name of the last change, and the times of the images of each, ms: fast changes need no reduced image. */
+
+/** Name of the last change, and the times of the images of each change by kind, from request to canvas, ms. */
 let lastName = null;
 const costs = new Map();
 
-/** Longest time of an image without a reduced one before it, ms; fraction of a time that stays with each image. */
-const [FAST_MS, STAYS] = [80, 0.9];
+/** Kinds of images, each with twice the resolution of the one before it. */
+const KINDS = ["coarse", "reduced", "full"];
+
+/** Longest expected times of the first image, and of an image that follows the coarsest at once, ms; fraction of a time
+ * that stays with each image; time of an image relative to that with half the resolution. */
+const [FIRST_MS, ALONE_MS, STAYS, FINER] = [80, 1000, 0.9, 3.5];
 
 function say(text) {
   element("message").textContent = text;
   element("message").hidden = !text;
 }
 
+/** Returns a duration in words. */
+function duration(seconds) {
+  if (seconds < 10) return `${seconds.toFixed(0)} s`;
+  if (seconds < 55) return `${Math.ceil(seconds / 5) * 5} s`;
+  const minutes = Math.round(seconds / 60);
+  return minutes === 1 ? "1 minute" : `${minutes} minutes`;
+}
+
 const status = (text) => { element("status").textContent = text; };
 
-/** Least time of an image relative to its reduced image; time beyond which a smaller field is offered, ms. */
-const [FULL_FACTOR, SLOW_MS] = [3.5, 4000];
+/** Time of an image beyond which a smaller field is offered, ms; interval at which the time of a preview is shown. */
+const [SLOW_MS, WAIT_MS] = [4000, 1000];
 
-/** Says how long the image takes, and offers a smaller field. */
-function offerSmaller(ms) {
-  const button = Object.assign(made("button", "Halve width and height"), { type: "button" });
-  button.addEventListener("click", () => {
-    const half = (side) => moved(side, Math.max(Math.round(centre(side) / 2), 16), [16, 32768]);
-    const { width_px, height_px } = state.recipe.field;
-    edit(["field"], { ...state.recipe.field, width_px: half(width_px), height_px: half(height_px) });
-  });
-  element("status").replaceChildren(`This field takes about ${Math.round(ms / 1000)} s.`, button);
+/** Returns the expected time of an image of the last change, ms; infinity if it is not known. */
+function expected(kind) {
+  const known = costs.get(lastName) ?? {};
+  const found = KINDS.findLastIndex((one, k) => one in known && k <= KINDS.indexOf(kind));
+  return found < 0 ? Infinity : known[KINDS[found]] * FINER ** (KINDS.indexOf(kind) - found);
 }
+
+/** Says how long a slow image takes and has taken, and offers a smaller field. */
+function offerSmaller(ms, seconds) {
+  const about = ms < Infinity ? `about ${duration(ms / 1000)}` : "long";
+  const text = `This field takes ${about}.`;
+  const node = element("status");
+  if (node.firstChild?.textContent !== text) {
+    const button = Object.assign(made("button", "Halve width and height"), { type: "button" });
+    button.addEventListener("click", () => {
+      const half = (side) => moved(side, Math.max(Math.round(centre(side) / 2), 16), [16, 32768]);
+      const { width_px, height_px } = state.recipe.field;
+      edit(["field"], { ...state.recipe.field, width_px: half(width_px), height_px: half(height_px) });
+    });
+    // Only the first part is read aloud.
+    const clock = Object.assign(made("span", ""), { ariaHidden: "true" });
+    node.replaceChildren(made("span", text), clock, button);
+  }
+  node.children[1].textContent = ` ${seconds.toFixed(0)} s so far.`;
+}
+
+/** Gives up outdated images. */
+let outdate = () => request("cancel", {}).catch(() => {});
+
+/** The image in progress: whether it is the first one of a change, and its start. */
+let present = { isFirst: true, start: 0 };
+
+/** Time after which the first image of an outdated change is given up, too, ms: less would leave none while a slider
+ * moves. */
+const FIRST_PATIENCE_MS = 200;
 
 /** Requests an image of the present state. `name` is that of the changed field. */
 function render(name = null) {
@@ -88,6 +126,7 @@ function render(name = null) {
   document.body.dataset.ready = false;
   document.body.dataset.full = false;
   if (!running) run();
+  else if (!present.isFirst || performance.now() - present.start > FIRST_PATIENCE_MS) outdate();
 }
 
 async function run() {
@@ -95,10 +134,14 @@ async function run() {
   try {
     while (dirty) {
       dirty = false;
-      const isFast = lastName !== null && (costs.get(lastName) ?? Infinity) < FAST_MS;
-      if (!isFast && !(await renderKind("reduced"))) continue;
-      if (dirty) continue;
-      await renderKind("full");
+      // Nothing is known of another recipe.
+      if (lastName === null) costs.delete(null);
+      const first = KINDS.findLast((kind) => expected(kind) < FIRST_MS) ?? "coarse";
+      for (const kind of KINDS.slice(KINDS.indexOf(first))) {
+        if (kind === "reduced" && kind !== first && expected("full") < ALONE_MS) continue;
+        present = { isFirst: kind === first, start: performance.now() };
+        if (dirty || !(await renderKind(kind))) break;
+      }
     }
   } catch (error) {
     say(error.status ? error.message : "The program does not respond. Start it again and reload the page.");
@@ -109,7 +152,12 @@ async function run() {
 
 /** Requests and shows an image. Returns whether it is shown. */
 async function renderKind(kind) {
-  const reply = await requestImage(kind, state.index);
+  const { start } = present;
+  const [name, ms] = [lastName, expected("full")];
+  const wait = () => offerSmaller(ms, (performance.now() - start) / 1000);
+  const waiting = ms > SLOW_MS ? setInterval(wait, WAIT_MS) : 0;
+  if (ms > SLOW_MS && ms < Infinity) wait();
+  const reply = await requestImage(kind, state.index).finally(() => clearInterval(waiting));
   const { head } = reply;
   if (head.cancelled) return false;
   if (head.errors) {
@@ -118,9 +166,9 @@ async function renderKind(kind) {
   }
   say("");
   showFaults([]);
-  if (kind === "full") costs.set(lastName, Math.max(head.ms, STAYS * (costs.get(lastName) ?? 0)));
   show(reply);
-  if (kind === "reduced" && FULL_FACTOR * head.ms > SLOW_MS) offerSmaller(FULL_FACTOR * head.ms);
+  const known = costs.get(name) ?? {};
+  costs.set(name, { ...known, [kind]: Math.max(performance.now() - start, STAYS * (known[kind] ?? 0)) });
   return true;
 }
 
@@ -135,7 +183,7 @@ function fail(errors) {
 
 function show(reply) {
   const { head } = reply;
-  shown = { ...reply, canvas: painted(reply) };
+  shown = { ...reply, canvas: painted(reply, shown?.canvas) };
   const [width, height] = [head.width * head.factor, head.height * head.factor];
   const isOther = !image || Math.abs(image.width - width) >= 4 || Math.abs(image.height - height) >= 4;
   if (head.factor === 1 || isOther) image = { width, height, pixel_um: head.pixel_um / head.factor };
@@ -147,7 +195,6 @@ function show(reply) {
   for (const name of layers.keys()) requestLabels(name);
   document.body.dataset.full = true;
   showReal();
-  hash();
 }
 
 // Outlines
@@ -297,6 +344,9 @@ function showFocus() {
 let stripOf = null;
 let stripRun = 0;
 
+/** Number of small fields that are made at the same time: the server makes one. */
+let parallel = 1;
+
 /** Number of small fields, and the pause before they are made, ms. */
 const [STRIP, STRIP_MS] = [8, 350];
 
@@ -314,15 +364,20 @@ async function showStrip() {
   const of = JSON.stringify([state.recipe, state.seed, first, element("noise-free").checked]);
   if (of === stripOf) return;
   await new Promise((resolve) => setTimeout(resolve, STRIP_MS));
-  for (let k = 0; k < STRIP; k += 1) {
-    if (!isPresent()) return;
-    const reply = await requestImage("small", first + k).catch(() => null);
-    if (!isPresent() || !reply?.levels) return;
-    const canvas = buttons[k].firstChild;
-    const { width, height } = reply.head;
-    Object.assign(canvas, { width, height });
-    canvas.getContext("2d").drawImage(painted(reply), 0, 0);
-  }
+  let next = 0;
+  const makeSome = async () => {
+    for (let k = next++; k < STRIP; k = next++) {
+      const reply = isPresent() ? await requestImage("small", first + k).catch(() => null) : null;
+      if (!isPresent() || !reply?.levels) return false;
+      const canvas = buttons[k].firstChild;
+      const { width, height } = reply.head;
+      Object.assign(canvas, { width, height });
+      canvas.getContext("2d").drawImage(painted(reply), 0, 0);
+    }
+    return true;
+  };
+  const parts = await Promise.all(Array.from({ length: parallel }, makeSome));
+  if (!parts.every(Boolean)) return;
   stripOf = of;
   document.body.dataset.strip = of.length;
 }
@@ -352,20 +407,8 @@ function showFacts() {
     ["saturated", `${((100 * head.saturated_px) / (head.width * head.height)).toFixed(2)} %`],
     ["computed again", again], ["time", `${head.ms.toFixed(0)} ms`],
   ];
-  const cell = made("dd", "…", "hash");
-  cell.id = "hash";
   const cells = rows.flatMap(([name, value]) => [made("dt", name), made("dd", String(value))]);
-  element("facts").replaceChildren(...cells, made("dt", "SHA-256"), cell);
+  element("facts").replaceChildren(...cells);
+  element("hash").textContent = document.body.dataset.hash = head.sha256;
   status(`Field ${state.index} of seed ${state.seed}: ${head.objects} objects, ${head.ms.toFixed(0)} ms.`);
-}
-
-/** Shows the SHA-256 of the samples of the image. */
-async function hash() {
-  const { raw, head } = shown;
-  const bytes = new Uint8Array(await crypto.subtle.digest("SHA-256", raw));
-  if (shown?.head.id !== head.id) return;
-  const text = [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
-  const cell = element("hash");
-  if (cell) Object.assign(cell, { textContent: `${text.slice(0, 12)}…`, title: text });
-  document.body.dataset.hash = text;
 }

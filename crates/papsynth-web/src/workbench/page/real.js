@@ -1,8 +1,9 @@
 "use strict";
 
-// An image of the user beside the field: at the same scale and grey levels, with the measurements of the judge.
+// Images of the user beside the field: at the same scale and grey levels, with the measurements of the judge.
 
-/** The image: description, samples, canvas. */
+/** All images, and the one that is shown: description, samples, canvas, name. */
+const reals = [];
 let real = null;
 
 const realUm = () => Number(element("real-um").value) || 0.25;
@@ -11,25 +12,45 @@ async function useReal(file) {
   if (!file) return;
   try {
     const headers = { "Content-Type": "application/octet-stream" };
-    const response = await fetch("real", { method: "POST", body: file, headers });
+    const response = await send("real", { method: "POST", body: file, headers });
     if (!response.ok) throw new Error((await response.json()).error);
     const reply = unframed(await response.arrayBuffer());
-    real = { ...reply, canvas: painted(reply), name: file.name };
+    reals.push({ ...reply, canvas: painted(reply), name: file.name });
     say("");
-    element("real-shown").hidden = element("real-remove").hidden = false;
     status(`${file.name}: ${reply.head.width} × ${reply.head.height} pixels.`);
-    fitBoth();
-    showReal();
+    chooseReal(reals.at(-1));
   } catch (error) {
     say(`${file.name}: ${error.message}`);
   }
 }
 
+async function useReals(files) {
+  for (const file of files) await useReal(file);
+}
+
+/** Shows one of the images, or none. */
+function chooseReal(next) {
+  real = next ?? null;
+  element("real-shown").hidden = element("real-remove").hidden = !real;
+  element("real-choice").hidden = reals.length < 2;
+  const options = reals.map(({ name, head }) => Object.assign(made("option", name), { value: head.id }));
+  element("real-name").replaceChildren(...options);
+  if (real) {
+    element("real-name").value = real.head.id;
+    fitBoth();
+    showReal();
+  } else {
+    element("real-file").value = "";
+    fit();
+  }
+  planMatch();
+}
+
 function removeReal() {
-  real = null;
-  element("real-shown").hidden = element("real-remove").hidden = true;
-  element("real-file").value = "";
-  fit();
+  const { id } = real.head;
+  reals.splice(reals.indexOf(real), 1);
+  chooseReal(reals.at(-1));
+  request("real/remove", { id }).catch((error) => say(error.message));
 }
 
 /** Space between the two images, image pixels. */
@@ -59,21 +80,19 @@ function fitBoth() {
   redraw();
 }
 
-/** Returns the levels of one channel, the green one of three, as fractions of the largest level. */
-function fractions({ head, levels }) {
-  const { channels, bits } = head;
-  const white = 2 ** bits - 1;
-  const first = channels === 3 ? 1 : 0;
-  return Float32Array.from({ length: head.width * head.height }, (_, i) => levels[i * channels + first] / white);
-}
-
 /** Bins of histograms. */
 const BINS = 64;
 
-function histogramOf(values) {
-  const counts = new Float64Array(BINS);
-  for (const value of values) counts[Math.min(Math.floor(value * BINS), BINS - 1)] += 1;
-  return counts.map((count) => count / values.length);
+/** Returns the fractions of pixels by grey level, of the green channel of three. */
+function histogramOf({ head, levels }) {
+  const { channels, bits, width, height } = head;
+  const counts = new Float64Array(2 ** bits);
+  for (let i = channels === 3 ? 1 : 0; i < levels.length; i += channels) counts[levels[i]] += 1;
+  const bins = new Float64Array(BINS);
+  counts.forEach((count, level) => {
+    bins[Math.min(Math.floor((level / (counts.length - 1)) * BINS), BINS - 1)] += count / (width * height);
+  });
+  return bins;
 }
 
 /** Draws curves over each other: lists of points with both coordinates from 0 to 1, and class names. */
@@ -101,7 +120,7 @@ const [COMPARE_MS, BARS] = [400, 14];
 /** Compares the two images. */
 function showReal() {
   if (!real || !shown || shown.head.factor > 1) return;
-  const [a, b] = [fractions(shown), fractions(real)].map(histogramOf);
+  const [a, b] = [shown, real].map(histogramOf);
   const most = Math.max(...a, ...b);
   const bars = (counts) => Array.from(counts, (count, i) => [(i + 0.5) / BINS, Math.sqrt(count / most)]);
   plot("histogram", [[bars(b), "theirs"], [bars(a), "ours"]], [[0, "0"], [0.5, "50 %"], [1, "100 %"]]);
@@ -111,10 +130,11 @@ function showReal() {
 }
 
 async function compare() {
-  const { id } = shown.head;
+  const [{ id }, own] = [shown.head, real];
+  if (!own) return;
   try {
-    const found = await (await request("compare", { id, pixel_um: realUm() })).json();
-    if (shown?.head.id === id && real) showCompared(found);
+    const found = await (await request("compare", { id, real: own.head.id, pixel_um: realUm() })).json();
+    if (shown?.head.id === id && real === own) showCompared(found);
   } catch (error) {
     // Another image has replaced this one.
     if (error.status !== 404) element("distances").replaceChildren(made("p", error.message, "quiet"));
@@ -152,13 +172,16 @@ function showCompared({ scalars, spectrum, profile }) {
   element("distances").replaceChildren(...rows);
 }
 
-element("real-file").addEventListener("change", ({ target }) => useReal(target.files[0]));
+element("real-file").addEventListener("change", ({ target }) => useReals([...target.files]));
 element("real-remove").addEventListener("click", removeReal);
-element("real-um").addEventListener("input", () => { showReal(); redraw(); });
+element("real-name").addEventListener("change", ({ target }) => {
+  chooseReal(reals.find(({ head }) => head.id === Number(target.value)));
+});
+element("real-um").addEventListener("input", () => { showReal(); planMatch(); redraw(); });
 addEventListener("dragover", (event) => { event.preventDefault(); element("drop").classList.add("over"); });
 addEventListener("dragleave", () => element("drop").classList.remove("over"));
 addEventListener("drop", (event) => {
   event.preventDefault();
   element("drop").classList.remove("over");
-  useReal(event.dataTransfer.files[0]);
+  useReals([...event.dataTransfer.files]);
 });

@@ -86,8 +86,21 @@ function setPreset({ name, recipe }) {
 
 const settle = () => { moving = null; };
 
-/** Sets a field. */
-const edit = (path, value, name = null) => setRecipe(replaced(state.recipe, path, value), name);
+/** Returns a recipe without the values of its conditions at a path, as `--set` leaves it. */
+function unconditional(recipe, path) {
+  if (!recipe.conditions?.length) return recipe;
+  const isOther = (key) => key.split(".").slice(0, path.length).some((name, k) => name !== path[k]);
+  const cleared = (numbers) => Object.fromEntries(Object.entries(numbers).filter(([key]) => isOther(key)));
+  const conditions = recipe.conditions.map((one) => ({ ...one, numbers: cleared(one.numbers) }));
+  return { ...recipe, conditions };
+}
+
+/** Returns the values of a number under the conditions of the recipe. */
+const conditionsAt = (path) =>
+  (state.recipe.conditions ?? []).map(({ numbers }) => numbers[path.join(".")]).filter((value) => value !== undefined);
+
+/** Sets a field, also under all conditions. */
+const edit = (path, value, name = null) => setRecipe(unconditional(replaced(state.recipe, path, value), path), name);
 
 function travel(from, to) {
   if (from.length === 0) return;
@@ -123,15 +136,17 @@ function settings() {
   return differences(state.base, recipe);
 }
 
-/** Returns the command that writes the field. */
-function commandLine() {
-  const words = ["papsynth generate", `--preset ${state.preset}`];
-  for (const [path, value] of settings()) {
-    words.push(`--set ${quoted(`${dotted(path)}=${toml(value)}`)}`);
-  }
-  words.push(`--seed ${state.seed}`, `--range ${state.index}..${state.index + 1}`, "--out field");
-  return words.join(" \\\n  ");
+/** Returns a command for the field, with further options. */
+function command(verb, ...options) {
+  const sets = settings().map(([path, value]) => `--set ${quoted(`${dotted(path)}=${toml(value)}`)}`);
+  return [`papsynth ${verb}`, `--preset ${state.preset}`, ...sets, `--seed ${state.seed}`, ...options].join(" \\\n  ");
 }
+
+/** Returns the command that writes the field. */
+const commandLine = () => command("generate", `--range ${state.index}..${state.index + 1}`, "--out field");
+
+/** Returns the command that prints the SHA-256 of the grey levels. */
+const checkLine = () => command("preview", `--index ${state.index}`);
 
 /** Returns a value in Python. */
 function python(value) {

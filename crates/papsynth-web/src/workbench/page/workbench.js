@@ -27,7 +27,7 @@ function showErrors(errors) {
   const total = element("text").value.split("\n").length;
   const lines = Array.from({ length: total }, (_, k) => made("span", `${k + 1}`, marked.has(k + 1) ? "wrong" : ""));
   element("lines").replaceChildren(...lines);
-  element("text").toggleAttribute("aria-invalid", errors.length > 0);
+  element("text").setAttribute("aria-invalid", errors.length > 0);
   const items = errors.map(({ line, message, help }) => {
     const button = made("button", [line ? made("b", `Line ${line}: `) : "", message], "plain");
     button.type = "button";
@@ -250,7 +250,7 @@ async function begin() {
     say(error.status ? error.message : "The program does not respond.");
     return;
   }
-  element("version").textContent = `papsynth ${info.version}`;
+  element("version").textContent = `papsynth ${info.version}, stream version ${info.stream_version}`;
   const presets = selectOf(info.presets.map(({ name, summary }) => [name, name, summary]));
   element("preset").replaceChildren(...presets.children);
   info.groups.forEach(addLayer);
