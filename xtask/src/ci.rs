@@ -51,7 +51,7 @@ const FULL: [Step; 12] = [
 ];
 
 /// Files and folders that require --full after a change, in addition to the folders of heavy packages.
-const COVERED: [&str; 10] = [
+const COVERED: [&str; 13] = [
     "Cargo.lock",
     "crates/*/src/interop.rs",
     "deny.toml",
