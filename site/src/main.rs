@@ -1,11 +1,15 @@
 //! Generates the documentation site: plain files that need no server.
 //!
-//! `papsynth-site ROOT PROGRAM ENGINE OUT [--no-pictures]` reads the pages of the repository in ROOT, asks the program for the
-//! schema and the presets, and replaces the folder OUT. ENGINE is the engine in WebAssembly. Links and anchors within the site are checked.
+//! `papsynth-site ROOT PROGRAM ENGINE OUT [--no-pictures]` reads the pages of the repository in ROOT, asks the program
+//! for the schema, the presets and the pictures of figures, and replaces the folder OUT. ENGINE is the engine in
+//! WebAssembly. Links and anchors within the site are checked.
 
 #![forbid(unsafe_code)]
 #![expect(clippy::print_stdout, reason = "a command line program")]
 
+mod equations;
+mod figures;
+mod fragment;
 mod gallery;
 mod layout;
 mod links;
@@ -34,11 +38,11 @@ pub(crate) struct Input {
     pub(crate) engine: PathBuf,
     /// Folder to write.
     pub(crate) out: PathBuf,
-    /// Whether the pictures of the gallery are rendered.
+    /// Whether the commands of figures are run.
     pub(crate) pictures: Pictures,
 }
 
-/// Whether the pictures of the gallery are rendered.
+/// Whether the commands of figures are run.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Pictures {
     Rendered,
@@ -55,7 +59,9 @@ impl Input {
         let [root, program, engine, out] = paths else {
             bail!("expected ROOT PROGRAM ENGINE OUT [--no-pictures]; `cargo xtask site` gives these arguments")
         };
-        Ok(Self { root: root.into(), program: program.into(), engine: engine.into(), out: out.into(), pictures })
+        // Commands run in other folders.
+        let program = fs::canonicalize(program).with_context(|| format!("cannot find the program {program}"))?;
+        Ok(Self { root: root.into(), program, engine: engine.into(), out: out.into(), pictures })
     }
 
     /// Reads a file of the repository.
@@ -66,8 +72,13 @@ impl Input {
 
     /// Runs `papsynth` and returns its standard output.
     pub(crate) fn papsynth(&self, words: &[&str]) -> Result<String> {
+        self.papsynth_in(&self.root, words)
+    }
+
+    /// Runs `papsynth` in a folder and returns its standard output.
+    pub(crate) fn papsynth_in(&self, folder: &Path, words: &[&str]) -> Result<String> {
         let mut command = Command::new(&self.program);
-        command.args(words).stdin(Stdio::null()).stderr(Stdio::inherit());
+        command.args(words).current_dir(folder).stdin(Stdio::null()).stderr(Stdio::inherit());
         let output = command.output().with_context(|| format!("cannot start {}", self.program.display()))?;
         ensure!(output.status.success(), "papsynth {} failed ({})", words.join(" "), output.status);
         String::from_utf8(output.stdout).with_context(|| format!("the output of papsynth {}", words.join(" ")))
@@ -86,9 +97,10 @@ fn main() -> ExitCode {
 
 fn build(input: &Input) -> Result<()> {
     replace(&input.out)?;
-    let mut pages = sources::pages(input)?;
+    gallery::check(input)?;
+    let mut pages = vec![gallery::page(input)?];
+    pages.extend(sources::pages(input)?);
     pages.extend(reference::pages(input)?);
-    pages.push(gallery::page(input)?);
     sources::sort(&mut pages);
     let sources = sources::by_path(&pages);
     for page in &mut pages {

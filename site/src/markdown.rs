@@ -6,8 +6,9 @@ use std::fs;
 use anyhow::{Context, Result, bail, ensure};
 use pulldown_cmark::{BrokenLink, CodeBlockKind, CowStr, Event, Options, Parser, Tag, TagEnd, html::push_html};
 
+use crate::figures::Figures;
 use crate::page::{Body, Heading, Page, folder, join};
-use crate::{Input, write};
+use crate::{Input, equations, write};
 
 /// Address of a link to an item of Rust, which the site does not have.
 const ITEM: &str = "item:";
@@ -20,10 +21,15 @@ pub(crate) fn html(input: &Input, page: &Page, sources: &BTreeMap<String, String
     };
     let parser = Parser::new_with_broken_link_callback(
         &page.text,
-        Options::ENABLE_TABLES | Options::ENABLE_STRIKETHROUGH,
+        Options::ENABLE_TABLES | Options::ENABLE_STRIKETHROUGH | Options::ENABLE_MATH,
         Some(&mut items),
     );
     let mut events: Vec<Event<'_>> = parser.collect();
+    equations::typeset(&mut events).with_context(|| shown(page).to_owned())?;
+    if let Some(figures) = Figures::make(input, page, &events).with_context(|| shown(page).to_owned())? {
+        events = figures.placed(events).with_context(|| shown(page).to_owned())?;
+        figures.remove()?;
+    }
     let mut headings = Vec::new();
     let mut used: BTreeMap<String, usize> = BTreeMap::new();
     for at in 0..events.len() {

@@ -5,23 +5,38 @@
 pub(crate) enum Group {
     Start,
     HowTo,
+    Gallery,
     Recipe,
+    Physics,
+    Measured,
     Formats,
-    Properties,
+    More,
     Crates,
 }
 
 impl Group {
-    pub(crate) const ALL: [Self; 6] =
-        [Self::Start, Self::HowTo, Self::Recipe, Self::Formats, Self::Properties, Self::Crates];
+    pub(crate) const ALL: [Self; 9] = [
+        Self::Start,
+        Self::HowTo,
+        Self::Gallery,
+        Self::Recipe,
+        Self::Physics,
+        Self::Measured,
+        Self::Formats,
+        Self::More,
+        Self::Crates,
+    ];
 
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Start => "Start",
             Self::HowTo => "How to",
+            Self::Gallery => "Gallery",
             Self::Recipe => "Recipe",
+            Self::Physics => "Physics",
+            Self::Measured => "What was measured",
             Self::Formats => "Formats",
-            Self::Properties => "Properties",
+            Self::More => "More",
             Self::Crates => "Crates",
         }
     }

@@ -10,7 +10,7 @@ use crate::page::{Group, Page};
 
 /// Pages in the order of the navigation: path, part of the navigation, title and source. Formats, crates and sections
 /// of recipes follow in their parts.
-const PAGES: [(&str, Group, &str, &str); 20] = [
+const PAGES: [(&str, Group, &str, &str); 28] = [
     ("index.html", Group::Start, "papsynth", "site/pages/index.md"),
     ("start.html", Group::Start, "Start in five minutes", "site/pages/start.md"),
     ("overview.html", Group::Start, "Overview", "README.md"),
@@ -21,16 +21,24 @@ const PAGES: [(&str, Group, &str, &str); 20] = [
     ("how-to/class.html", Group::HowTo, "A new class", "site/pages/how-to/class.md"),
     ("how-to/debris.html", Group::HowTo, "A new kind of debris", "site/pages/how-to/debris.md"),
     ("how-to/slides.html", Group::HowTo, "Whole slides", "site/pages/how-to/slides.md"),
-    ("properties/limits.html", Group::Properties, "Limits", "site/pages/limits.md"),
-    ("properties/performance.html", Group::Properties, "Performance", "docs/PERFORMANCE.md"),
-    ("properties/worth.html", Group::Properties, "Worth for training", "docs/WORTH.md"),
-    ("properties/reproducibility.html", Group::Properties, "Reproducibility", "docs/REPRODUCIBILITY.md"),
-    ("properties/slides.html", Group::Properties, "Files of whole slides", "docs/SLIDES.md"),
-    ("properties/clusters.html", Group::Properties, "Clusters", "docs/CLUSTERS.md"),
-    ("properties/glossary.html", Group::Properties, "Glossary", "docs/GLOSSARY.md"),
-    ("properties/architecture.html", Group::Properties, "Architecture", "ARCHITECTURE.md"),
-    ("properties/decisions.html", Group::Properties, "Decisions", "docs/decisions.md"),
-    ("properties/changes.html", Group::Properties, "Changes", "CHANGELOG.md"),
+    ("gallery/cells.html", Group::Gallery, "Classes of cells", "site/pages/gallery/cells.md"),
+    ("gallery/debris.html", Group::Gallery, "Kinds of debris", "site/pages/gallery/debris.md"),
+    ("physics/index.html", Group::Physics, "From a scene to grey levels", "site/pages/physics/index.md"),
+    ("physics/cells.html", Group::Physics, "Cells", "site/pages/physics/cells.md"),
+    ("physics/stain.html", Group::Physics, "Stain and colour", "site/pages/physics/stain.md"),
+    ("physics/optics.html", Group::Physics, "Image formation", "site/pages/physics/optics.md"),
+    ("physics/camera.html", Group::Physics, "Camera", "site/pages/physics/camera.md"),
+    ("properties/measured.html", Group::Measured, "Overview", "site/pages/measured.md"),
+    ("properties/limits.html", Group::Measured, "Limits", "site/pages/limits.md"),
+    ("properties/performance.html", Group::Measured, "Performance", "docs/PERFORMANCE.md"),
+    ("properties/worth.html", Group::Measured, "Worth for training", "docs/WORTH.md"),
+    ("properties/reproducibility.html", Group::Measured, "Reproducibility", "docs/REPRODUCIBILITY.md"),
+    ("properties/slides.html", Group::More, "Files of whole slides", "docs/SLIDES.md"),
+    ("properties/clusters.html", Group::More, "Clusters", "docs/CLUSTERS.md"),
+    ("properties/glossary.html", Group::More, "Glossary", "docs/GLOSSARY.md"),
+    ("properties/architecture.html", Group::More, "Architecture", "ARCHITECTURE.md"),
+    ("properties/decisions.html", Group::More, "Decisions", "docs/decisions.md"),
+    ("properties/changes.html", Group::More, "Changes", "CHANGELOG.md"),
 ];
 
 /// Begins a line that stands for a section of another file: `<!-- section README.md Limits -->`.

@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use serde_json::Value;
 
-use crate::{Input, gallery, write};
+use crate::{Input, figures, write};
 
 /// Folders of the files of the page.
 const PAGE: &str = "crates/papsynth-web/src/workbench/page";
@@ -73,7 +73,7 @@ fn start(input: &Input, out: &Path, bytes: usize) -> Result<String> {
     let manifest: Value = serde_json::from_slice(&read("manifest.json")?).context("the manifest of the first field")?;
     fs::remove_dir_all(&work).with_context(|| format!("cannot remove {folder}"))?;
     write(&out.join("field.png"), &field)?;
-    let [width, height] = gallery::size(&field).context("the first field is not a PNG image")?;
+    let [width, height] = figures::size(&field).context("the first field is not a PNG image")?;
     Ok(format!(
         "<div id=\"start\">
     <img src=\"field.png\" width=\"{width}\" height=\"{height}\" alt=\"A field of the preset lbc\">

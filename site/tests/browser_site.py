@@ -9,7 +9,10 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2] / "xtask/python"))
 from chromium import Browser  # noqa: E402
 
-SHOWN = ["index", "start", "gallery", "recipe/optics", "recipe/index", "how-to/microscope", "properties/performance"]
+SHOWN = [
+    "index", "start", "gallery/presets", "gallery/debris", "physics/optics", "recipe/optics", "recipe/index",
+    "how-to/microscope", "properties/performance",
+]
 
 
 def main(chromium, site, pictures):

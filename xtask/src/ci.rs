@@ -51,7 +51,7 @@ const FULL: [Step; 12] = [
 ];
 
 /// Files and folders that require --full after a change, in addition to the folders of heavy packages.
-const COVERED: [&str; 10] = [
+const COVERED: [&str; 13] = [
     "Cargo.lock",
     "crates/*/src/interop.rs",
     "deny.toml",
@@ -59,6 +59,9 @@ const COVERED: [&str; 10] = [
     "docs/formats",
     "fixtures/hashes.txt",
     "hashes",
+    "site/pages/gallery",
+    "site/pages/physics",
+    "site/src/figures.rs",
     "site/src/gallery.rs",
     "xtask/src/external.rs",
     "xtask/src/package.rs",

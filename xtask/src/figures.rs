@@ -25,7 +25,7 @@ const EFFECTS: [&str; 13] = [
 
 /// Other figures: number in the paper or name, contents, package and example that draw it, and an argument before the
 /// path.
-const FIGURES: [(&str, &str, &str, &str, &str); 13] = [
+const FIGURES: [(&str, &str, &str, &str, &str); 15] = [
     ("1", "bacilli, leukocytes, speckles, objects out of focus", "papsynth", "figures", "1"),
     ("3", "drawn outlines", "fsd-shape", "sheet", ""),
     ("4", "patches and their overlaps", "quilt-texture", "nucleus", ""),
@@ -39,7 +39,12 @@ const FIGURES: [(&str, &str, &str, &str, &str); 13] = [
     ("13", "high-grade cells", "papsynth", "figures", "13"),
     ("cells", "every class of cell with its name", "papsynth", "picture_book", "cells"),
     ("debris", "every kind of debris with its name", "papsynth", "picture_book", "debris"),
+    ("spectra", "absorbance of the dyes, weights of the colour channels", "dye-spectra", "spectra", ""),
+    ("transfer", "transfer functions in and out of focus", "optics-psf", "transfer", ""),
 ];
+
+/// Figures of curves, which are SVG; the others are PNG.
+const CURVES: [&str; 2] = ["spectra", "transfer"];
 
 /// Returns the parser of figure names.
 pub(crate) fn names() -> PossibleValuesParser {
@@ -56,7 +61,8 @@ pub(crate) fn run(workspace: &Workspace, wanted: &[String]) -> Result<()> {
         if !wanted.is_empty() && !wanted.iter().any(|word| word == name) {
             continue;
         }
-        let path = folder.join(format!("fig-{name:0>2}.png"));
+        let ending = if CURVES.contains(&name) { "svg" } else { "png" };
+        let path = folder.join(format!("fig-{name:0>2}.{ending}"));
         let mut command = workspace.cargo();
         command.args(["run", "--release", "--package", package, "--example", example, "--"]);
         shell::run(command.args(argument.split_whitespace()).arg(&path))?;

@@ -10,12 +10,13 @@ use crate::workspace::Workspace;
 /// Generates the documentation site in target/site: plain files that need no server
 ///
 /// The pages are those of site/pages, docs and the READMEs; a reference of recipes, from their schema; and a gallery
-/// with a field of each preset, which `papsynth` renders. The folder workbench is the page of `papsynth workbench` with
-/// the engine in WebAssembly (target wasm32-unknown-unknown); any server of files can host it. Fails if a link or an anchor within the site does not exist.
+/// with a field of each preset. `papsynth` renders the pictures of galleries and physics. The folder workbench is the
+/// page of `papsynth workbench` with the engine in WebAssembly (target wasm32-unknown-unknown); any server of files can
+/// host it. Fails if a link or an anchor within the site does not exist.
 /// `cargo xtask browser` opens all pages.
 #[derive(clap::Args)]
 pub(crate) struct Site {
-    /// Leaves out the pictures of the gallery
+    /// Leaves out the pictures that commands of the pages make
     #[arg(long)]
     no_pictures: bool,
     /// Program `papsynth` to use, instead of a build in release mode

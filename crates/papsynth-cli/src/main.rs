@@ -39,6 +39,7 @@ use papsynth::recipe::{Preset, Recipe};
 use args::{Init, Verb};
 use exit::ExitError;
 use output_file::{Kind, OutputFile};
+use recipe_file::RecipeFile;
 
 fn main() -> ExitCode {
     memory::configure_allocator();
@@ -128,9 +129,13 @@ fn init(args: &Init) -> Result<(), ExitError> {
         let lines = Preset::ALL.map(|preset| format!("{:<longest$}  {}\n", preset.name(), preset.summary()));
         return exit::print(&lines.concat());
     }
-    let text = args.preset.recipe().to_commented_toml();
+    let recipe = || Ok::<_, ExitError>(RecipeFile::load(&args.recipe)?.recipe.to_commented_toml());
     match &args.out {
-        None => exit::print(&text),
-        Some(path) => OutputFile::check(path, Kind::Recipe, args.force)?.write(text.as_bytes()),
+        None => exit::print(&recipe()?),
+        Some(path) => {
+            let out = OutputFile::check(path, Kind::Recipe, args.force)?;
+            out.write(recipe()?.as_bytes())?;
+            exit::print(&format!("{}: recipe written; `papsynth preview` shows one of its fields\n", path.display()))
+        }
     }
 }

@@ -83,6 +83,9 @@ pub enum InputError {
     /// The "file" or "folder" does not exist.
     #[error("there is no such {0}")]
     Missing(&'static str),
+    /// The path is not a folder.
+    #[error("is not a folder; expected a folder of images")]
+    NotAFolder,
     /// The path is a folder.
     #[error("is a folder; expected a file")]
     Folder,

@@ -21,7 +21,6 @@ use std::path::{Path, PathBuf};
 
 use clap::error::{ContextKind, ContextValue};
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
-use papsynth::recipe::Preset;
 use papsynth_dataset::Location;
 
 use crate::exit::{ExitError, escaped};
@@ -44,7 +43,6 @@ pub(crate) use shared::{EngineArgs, LayoutArgs, RecipeArgs, threads};
 pub(crate) use slide::{Slide, SlideTile, SlideVerb};
 #[cfg(feature = "zarr")]
 pub(crate) use slide::{SlideFinalize, SlideMake};
-use values::preset_parser;
 #[cfg(feature = "web")]
 pub(crate) use web::{Study, View, Workbench};
 #[cfg(not(feature = "judge"))]
@@ -64,6 +62,7 @@ Examples:
   papsynth init --preset dense --out dense.toml   write a commented recipe to edit
   papsynth preview dense.toml                     show one field next to its ground truth
   papsynth generate dense.toml --out dense --frames 100
+  papsynth match images --pixel-um 0.33 --out mine.toml    find a recipe for fields like yours
 
 Exit codes:
     0  success
@@ -112,11 +111,11 @@ pub(crate) enum Verb {
 Examples:
   papsynth init > my.toml
   papsynth init --preset high-grade --out my.toml
+  papsynth init --set field.pixel_um=0.33 --set optics.na=0.75 --out my.toml
   papsynth init --list")]
 pub(crate) struct Init {
-    /// Built-in recipe to print [default: lbc]
-    #[arg(long, value_name = "NAME", value_parser = preset_parser(), default_value = Preset::Lbc.name(), hide_default_value = true)]
-    pub(crate) preset: Preset,
+    #[command(flatten)]
+    pub(crate) recipe: RecipeArgs,
     /// Write to this file instead of standard output
     #[arg(long, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
@@ -124,7 +123,7 @@ pub(crate) struct Init {
     #[arg(long, requires = "out")]
     pub(crate) force: bool,
     /// List the built-in recipes
-    #[arg(long, conflicts_with_all = ["preset", "out"])]
+    #[arg(long, exclusive = true)]
     pub(crate) list: bool,
 }
 

@@ -112,7 +112,8 @@ pub fn read_pairs(images_folder: &Path, masks_folder: &Path, limits: &Limits) ->
 /// If the folder has no such file, has images in other formats, or has two images that differ only in their extensions.
 pub fn image_files(folder: &Path) -> Result<BTreeMap<String, PathBuf>, Error> {
     let failed = |e: io::Error| match e.kind() {
-        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Error::input(folder)(InputError::Missing("folder")),
+        io::ErrorKind::NotFound => Error::input(folder)(InputError::Missing("folder")),
+        io::ErrorKind::NotADirectory => Error::input(folder)(InputError::NotAFolder),
         _ => Error::io("read", folder)(e),
     };
     let (mut found, mut others) = (BTreeMap::new(), Vec::new());

@@ -55,6 +55,8 @@ presets! {
     Oral = "oral",
     /// The default slide as EDF images of a scanner.
     ExtendedFocus = "extended-focus",
+    /// An empty field of 800 x 600 pixels, to which cells and debris can be added.
+    Empty = "empty",
 }
 
 impl Preset {
@@ -102,6 +104,7 @@ mod tests {
     use super::super::imaging::Gaussians;
     use super::super::specimen::{Seam, Sheet};
     use super::*;
+    use crate::recipe::Debris;
 
     #[test]
     fn every_preset_is_valid_and_reads_back_as_written() {
@@ -115,6 +118,13 @@ mod tests {
             assert_eq!(Preset::by_name(preset.name()), Some(preset));
         }
         assert_eq!(Preset::Lbc.recipe(), Recipe::default());
+    }
+
+    #[test]
+    fn the_empty_preset_has_no_objects() {
+        let empty = Preset::Empty.recipe();
+        assert!(empty.cells.is_empty());
+        assert_eq!(empty.debris, Debris::none());
     }
 
     #[test]
