@@ -78,7 +78,7 @@ fn start(input: &Input, out: &Path, bytes: usize) -> Result<String> {
         "<div id=\"start\">
     <img src=\"field.png\" width=\"{width}\" height=\"{height}\" alt=\"A field of the preset lbc\">
     <div>
-      <p>The first field of the preset lbc, rendered by {version}, random numbers {stream}.</p>
+      <p>The first field of the preset lbc, rendered by {version}, stream version {stream}.</p>
       <p>The engine renders fields on your machine. Nothing is sent anywhere.</p>
       <button id=\"load\" type=\"button\">Load the engine ({size:.1} MB)</button>
       <p id=\"loading\" role=\"status\"><noscript>The engine needs JavaScript.</noscript></p>
@@ -86,7 +86,7 @@ fn start(input: &Input, out: &Path, bytes: usize) -> Result<String> {
   </div>
     ",
         version = input.papsynth(&["--version"])?.trim(),
-        stream = manifest["stream_version"],
+        stream = manifest["identity"]["stream_version"],
         size = bytes as f64 / 1e6,
     ))
 }

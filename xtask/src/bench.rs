@@ -3,13 +3,15 @@
 pub(crate) mod counts;
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use anyhow::{Result, ensure};
 use clap::{Args, Subcommand};
 
+use crate::shell::{self, skipped};
 use crate::workspace::Workspace;
-use crate::{peers, shell};
+use crate::{peers, site};
 
 /// Runs the benchmarks of all crates, counts instructions, or compares with other programs
 #[derive(Args)]
@@ -38,12 +40,25 @@ enum BenchCommand {
         bless: bool,
     },
     Peers(peers::Peers),
+    /// Compares the CPU time of fields in WebAssembly with that of the program, on one thread each, with Node
+    ///
+    /// An instance of the engine of the site and `papsynth workbench --threads 1` render fields of the default recipe
+    /// alternately. Fails if a field has other pixels.
+    Wasm {
+        /// Program `papsynth` to compare with, instead of a build in release mode
+        #[arg(long, value_name = "PATH")]
+        program: Option<PathBuf>,
+        /// Number of fields
+        #[arg(long, value_name = "N", default_value_t = 24)]
+        fields: u32,
+    },
 }
 
 pub(crate) fn run(workspace: &Workspace, arguments: Bench) -> Result<()> {
     match arguments.command {
         Some(BenchCommand::Counts { bless }) => return counts::run(workspace, bless),
         Some(BenchCommand::Peers(peers)) => return peers::run(workspace, &peers),
+        Some(BenchCommand::Wasm { program, fields }) => return wasm(workspace, program, fields),
         None => {}
     }
     // Selects each benchmark by name, because the test harness of a library rejects arguments of criterion.
@@ -61,6 +76,17 @@ pub(crate) fn run(workspace: &Workspace, arguments: Bench) -> Result<()> {
         command.args(["--baseline-lenient", &name]);
     }
     shell::run(command.args(arguments.filter))
+}
+
+/// Compares the engine in WebAssembly with the program.
+fn wasm(workspace: &Workspace, program: Option<PathBuf>, fields: u32) -> Result<()> {
+    if !shell::answers("node", "--version") {
+        return Err(skipped("Node is not installed"));
+    }
+    let engine = site::engine(workspace, "wasm")?;
+    let program = program.map_or_else(|| site::program(workspace), Ok)?;
+    let script = workspace.root.join("xtask/src/wasm_speed.mjs");
+    shell::run(Command::new("node").arg(script).arg(engine).arg(program).arg(fields.to_string()))
 }
 
 /// Returns whether any benchmark below a folder has results of that name.

@@ -41,6 +41,8 @@ pub(crate) fn run(workspace: &Workspace) -> Result<()> {
     run("browser_view.py", &[&stack, &folder.join("view")])?;
     run("browser_workbench.py", &[&folder.join("workbench")])?;
     let pages = site::check(workspace)?;
+    let script = workspace.root.join("crates/papsynth-wasm/tests/browser_engine.py");
+    shell::run(Command::new(&python).arg(script).arg(&program).arg(chromium).args([&pages, &folder.join("engine")]))?;
     let script = workspace.root.join("site/tests/browser_site.py");
     shell::run(Command::new(&python).arg(script).arg(chromium).args([&pages, &folder.join("site")]))
 }

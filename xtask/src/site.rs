@@ -24,14 +24,7 @@ pub(crate) struct Site {
 }
 
 pub(crate) fn run(workspace: &Workspace, options: &Site) -> Result<()> {
-    let program = match &options.program {
-        Some(program) => program.clone(),
-        None => {
-            let build = ["build", "--release", "--package", "papsynth-cli", "--no-default-features"];
-            shell::run(workspace.cargo().args(build))?;
-            workspace.program("release", "papsynth")
-        }
-    };
+    let program = options.program.clone().map_or_else(|| program(workspace), Ok)?;
     let engine = engine(workspace, "wasm")?;
     generate(workspace, &program, &engine, &workspace.target.join("site"), !options.no_pictures)
 }
@@ -41,8 +34,15 @@ pub(crate) fn whole(workspace: &Workspace) -> Result<()> {
     run(workspace, &Site { no_pictures: false, program: None })
 }
 
+/// Builds the program in release mode, and returns its file.
+pub(crate) fn program(workspace: &Workspace) -> Result<PathBuf> {
+    let build = ["build", "--release", "--package", "papsynth-cli", "--no-default-features", "--features", "web"];
+    shell::run(workspace.cargo().args(build))?;
+    Ok(workspace.program("release", "papsynth"))
+}
+
 /// Builds the engine in WebAssembly with a profile, and returns its file.
-fn engine(workspace: &Workspace, profile: &str) -> Result<PathBuf> {
+pub(crate) fn engine(workspace: &Workspace, profile: &str) -> Result<PathBuf> {
     const TARGET: &str = "wasm32-unknown-unknown";
     need_target(TARGET)?;
     let build = ["build", "--package", "papsynth-wasm", "--lib", "--target", TARGET, "--profile", profile];

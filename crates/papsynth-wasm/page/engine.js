@@ -9,74 +9,81 @@ const PATIENCE_MS = 1000;
 /** Numbers of images that one instance may use. */
 const IMAGES = 1_000_000;
 
-/** The compiled engine; set by `load`. */
-let module = null;
+/** The compiled engine. */
+let compiled = null;
+
+/** Returns a reply with an error, as the engine writes it. */
+const failed = (status, error) => new Response(JSON.stringify({ error }), { status });
 
 /** A worker with an instance of the engine. */
 class Instance {
   #worker = null;
   #started = 0;
   #number = 0;
+  /** Requests without a reply by number. */
   #waiting = new Map();
-  /** Images of the user, for a new instance. */
+  /** Requests about images of the user, which each new instance gets again. */
   #kept = [];
 
-  /** Starts the worker, if necessary anew. The instance then has no image, and those of the user again. */
   #start() {
     const worker = new Worker("worker.js");
     worker.addEventListener("message", ({ data }) => this.#receive(data));
     worker.addEventListener("error", () => this.#fail());
-    worker.postMessage({ module, imagesBefore: IMAGES * this.#started });
+    worker.postMessage({ module: compiled, imagesBefore: IMAGES * this.#started });
     this.#started += 1;
     this.#worker = worker;
-    for (const { head, body } of this.#kept) worker.postMessage({ number: 0, head, body });
+    for (const kept of this.#kept) worker.postMessage(kept);
   }
 
   #end() {
-    this.#worker?.terminate();
+    this.#worker.terminate();
     this.#worker = null;
-    const waiting = [...this.#waiting.values()];
-    this.#waiting.clear();
-    return waiting;
   }
 
   #fail() {
-    const error = JSON.stringify({ error: "The engine failed at this request, and was started again." });
-    for (const { resolve } of this.#end()) resolve(new Response(error, { status: 500 }));
+    this.#end();
+    this.#kept = this.#kept.filter(({ number }) => !this.#waiting.has(number));
+    for (const { resolve } of this.#waiting.values()) {
+      resolve(failed(500, "The engine failed at this request, and is started again."));
+    }
+    this.#waiting.clear();
   }
 
   #receive({ number, head, body, failure }) {
-    if (failure) this.#fail();
+    if (failure) {
+      this.#fail();
+      return;
+    }
     const waiting = this.#waiting.get(number);
-    if (!waiting) return;
     this.#waiting.delete(number);
-    waiting.resolve(new Response(body, { status: head.status, headers: { "Content-Type": head.content_type } }));
+    waiting?.resolve(new Response(body, { status: head.status, headers: { "Content-Type": head.content_type } }));
   }
 
   /** Returns the reply to a request. */
   ask(head, body) {
     if (!this.#worker) this.#start();
-    if (head.target.startsWith("/real")) this.#kept.push({ head, body });
     const number = (this.#number += 1);
-    const reply = new Promise((resolve) => {
-      this.#waiting.set(number, { resolve, head, since: performance.now() });
-    });
-    this.#worker.postMessage({ number, head, body });
-    return reply;
+    const message = { number, head, body };
+    if (head.target.startsWith("/real")) this.#kept.push(message);
+    this.#worker.postMessage(message);
+    return new Promise((resolve) => this.#waiting.set(number, { resolve, head, since: performance.now() }));
   }
 
   get isBusy() {
     return this.#waiting.size > 0;
   }
 
-  /** Gives up an image that takes long, and what waits for it. */
-  giveUp() {
-    const isSlow = ({ head, since }) => head.target === "/render" && performance.now() - since > PATIENCE_MS;
+  /** Gives up an image that takes long, and what waits for it. The next instance has no image yet. */
+  giveUp(patienceMs = PATIENCE_MS) {
+    const isSlow = ({ head, since }) => head.target === "/render" && performance.now() - since >= patienceMs;
     if (![...this.#waiting.values()].some(isSlow)) return;
-    for (const { resolve, head } of this.#end()) {
-      const isImage = head.target === "/render";
-      resolve(isImage ? cancelled() : new Response(JSON.stringify({ error: "replaced" }), { status: 404 }));
+    this.#end();
+    for (const [number, { resolve, head }] of this.#waiting) {
+      if (head.target.startsWith("/real")) continue;
+      this.#waiting.delete(number);
+      resolve(head.target === "/render" ? cancelled() : failed(404, "another image replaces this one"));
     }
+    if (this.isBusy) this.#start();
   }
 }
 
@@ -86,10 +93,11 @@ function cancelled() {
   return new Response(new Blob([new Uint32Array([text.length]), text]));
 }
 
-/** The instances: for images, for reduced images and text, and for small images. */
-const [full, reduced, small] = [new Instance(), new Instance(), []];
+/** The instances for images, for reduced images and text, and for small images. */
+const instances = { full: new Instance(), reduced: new Instance(), small: [] };
 
 function instanceFor(target, options) {
+  const { full, reduced, small } = instances;
   if (target === "/render") {
     const { view } = JSON.parse(options.body);
     if (view === "small") return small.find((instance) => !instance.isBusy) ?? small[0];
@@ -103,45 +111,45 @@ async function bytesOf(body) {
   return new Uint8Array(await new Response(body).arrayBuffer());
 }
 
-let begun = null;
-const loaded = new Promise((resolve) => { begun = resolve; });
+/** Called when the engine is compiled. */
+let setCompiled = () => {};
+const compiling = new Promise((resolve) => { setCompiled = resolve; });
 
 send = async (path, options) => {
-  await loaded;
+  await compiling;
   const target = `/${path}`;
   const head = { method: options.method ?? "GET", target, content_type: options.headers?.["Content-Type"] ?? null };
-  const instance = instanceFor(target, options);
-  return instance.ask(head, await bytesOf(options.body));
+  return instanceFor(target, options).ask(head, await bytesOf(options.body));
 };
 
-outdate = () => [full, reduced, ...small].forEach((instance) => instance.giveUp());
+outdate = () => {
+  for (const instance of Object.values(instances).flat()) instance.giveUp();
+};
 
 // The start: a picture and a button.
+{
+  const button = element("load");
+  /** The parts of the page that need the engine. */
+  const parts = [...document.querySelectorAll("#bar > :not(a, h1), #recipe, #tools, #strip, aside")];
+  for (const part of parts) part.inert = true;
 
-const start = element("start");
-const button = element("load");
-
-/** The parts of the page that need the engine. */
-const parts = [...document.querySelectorAll("#bar, #recipe, #tools, #strip, aside")];
-
-async function load() {
-  button.disabled = true;
-  element("loading").textContent = "Loading …";
-  try {
-    const response = await fetch("engine.wasm.zlib");
-    if (!response.ok) throw new Error(`${response.status} ${response.statusText}`);
-    const plain = response.body.pipeThrough(new DecompressionStream("deflate"));
-    module = await WebAssembly.compile(await new Response(plain).arrayBuffer());
-    parallel = Math.max(1, Math.min(navigator.hardwareConcurrency - 1, 4));
-    small.push(...Array.from({ length: parallel }, () => new Instance()));
-    begun();
-    start.remove();
-    for (const part of parts) part.inert = false;
-  } catch (error) {
-    button.disabled = false;
-    element("loading").textContent = `The engine cannot be loaded: ${error.message}.`;
-  }
+  button.addEventListener("click", async () => {
+    button.disabled = true;
+    element("loading").textContent = "Loading …";
+    try {
+      const response = await fetch("engine.wasm.zlib");
+      if (!response.ok) throw new Error(`${response.status} ${response.statusText}`);
+      const plain = response.body.pipeThrough(new DecompressionStream("deflate"));
+      compiled = await WebAssembly.compile(await new Response(plain).arrayBuffer());
+      parallel = Math.max(1, Math.min(navigator.hardwareConcurrency - 1, 4));
+      instances.small = Array.from({ length: parallel }, () => new Instance());
+      setCompiled();
+      element("start").remove();
+      for (const part of parts) part.inert = false;
+    } catch (error) {
+      button.disabled = false;
+      const reason = location.protocol === "file:" ? "browsers load it from web servers only" : error.message;
+      element("loading").textContent = `The engine cannot be loaded: ${reason}.`;
+    }
+  });
 }
-
-for (const part of parts) part.inert = true;
-button.addEventListener("click", load);

@@ -22,6 +22,7 @@ const matchRequest = () => ({
 async function planMatch() {
   if (reals.length === 0) return;
   element("match").hidden = !info.matches;
+  element("no-match").hidden = info.matches;
   if (!info.matches) return;
   const own = (plans += 1);
   element("match-start").disabled = matching || reals.length < LEAST_REALS;

@@ -250,7 +250,7 @@ async function begin() {
     say(error.status ? error.message : "The program does not respond.");
     return;
   }
-  element("version").textContent = `papsynth ${info.version}, random numbers ${info.stream_version}`;
+  element("version").textContent = `papsynth ${info.version}, stream version ${info.stream_version}`;
   const presets = selectOf(info.presets.map(({ name, summary }) => [name, name, summary]));
   element("preset").replaceChildren(...presets.children);
   info.groups.forEach(addLayer);
