@@ -65,6 +65,7 @@ impl RealImages {
     }
 
     /// Returns an image.
+    #[cfg(feature = "judge")]
     pub(super) fn get(&self, id: usize) -> Result<Arc<RealImage>, Reply> {
         self.images.get(&id).cloned().ok_or_else(|| Reply::error(404, "this image was removed"))
     }
