@@ -114,7 +114,9 @@ class Browser:
         self.call("Input.dispatchKeyEvent", type="keyUp", **fields)
 
     def click(self, selector):
-        box = self.run(f"(r => [r.x + r.width / 2, r.y + r.height / 2])(document.querySelector('{selector}').getBoundingClientRect())")
+        node = f"document.querySelector('{selector}')"
+        self.run(f"{node}.scrollIntoView({{ block: 'nearest' }})")
+        box = self.run(f"(r => [r.x + r.width / 2, r.y + r.height / 2])({node}.getBoundingClientRect())")
         for kind in ("mousePressed", "mouseReleased"):
             self.call("Input.dispatchMouseEvent", type=kind, x=box[0], y=box[1], button="left", clickCount=1)
 

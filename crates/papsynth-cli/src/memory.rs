@@ -70,7 +70,7 @@ pub(crate) fn fit(
 ) -> Result<MemoryPlan, ExitError> {
     let limits = Limits::new(asked);
     let bytes = |threads: usize| limits.budget(threads).map(|budget| budget.bytes);
-    let all_on_one = if shared { need.plan(1, true, bytes(threads)).filter(|fit| fit.shared) } else { None };
+    let all_on_one = if shared { need.plan(threads, true, bytes(threads)).filter(|fit| fit.shared) } else { None };
     // Each thread reserves addresses, so that fewer threads have a larger budget.
     let separate = |frames: usize| need.plan(frames, false, bytes(frames)).filter(|fit| fit.workers == frames);
     let Some(fit) = all_on_one.or_else(|| (1..=workers).rev().find_map(separate)) else {

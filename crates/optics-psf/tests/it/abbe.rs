@@ -32,6 +32,27 @@ fn full_lattice_matches_the_reference_and_few_points_converge() {
 }
 
 #[test]
+fn an_integration_ends_before_any_of_its_transforms() {
+    let abbe = abbe(0.6, Source::Vogel { points: 3 });
+    let layer = |depth_um: f64| Layer::new(depth_um, vec![[0.9, 0.1]; SIDE * SIDE]).unwrap();
+    let layers = [layer(0.0), layer(2.0)];
+    let calls = core::cell::Cell::new(0);
+    let image = |most: usize| {
+        calls.set(0);
+        let goes_on = || calls.replace(calls.get() + 1) < most;
+        abbe.image_while(&layers, 0.0, &goes_on).unwrap()
+    };
+    // One step between the layers and one to the image, for each direction.
+    let all = 2 * abbe.directions();
+    assert_eq!(image(all), Some(abbe.image(&layers, 0.0).unwrap()));
+    assert_eq!(calls.get(), all);
+    for most in [0, 1, all - 1] {
+        assert_eq!(image(most), None);
+        assert_eq!(calls.get(), most + 1);
+    }
+}
+
+#[test]
 fn two_layers_match_the_reference() {
     let (Some(disk), Some(asym)) = (array("ref_disk_absorbance"), array("ref_asym_absorbance")) else { return };
     let Some(reference) = array("ref_multislice2_nac060") else { return };

@@ -141,16 +141,14 @@ impl Matching {
     }
 
     /// Returns the number of simulated fields and the estimated duration. `pace` is the time that a pixel of an image
-    /// takes, s.
+    /// takes, s; a simulated field takes about as long, because each is made by one thread and also measured.
     pub(super) fn estimate(&self, asked: &MatchRequest, real: &Mutex<RealImages>, pace: f64) -> Result<Value, Reply> {
-        /// Duration of a simulated field relative to that of an image: it is also measured, and most have more cells.
-        const FIELD: f64 = 1.9;
         let Task { matching, images, workers } = self.task(asked, real)?;
         let colour = images.iter().all(|(_, real)| real.image.channels == 3);
         let simulated = matching.simulated(images.len(), colour);
         let pixels = images.first().map_or(0, |(_, real)| Sampler::size_of(real.size()).iter().product::<usize>());
         let slower = self.threads() as f64 / workers as f64;
-        let seconds = FIELD * pace * slower * (pixels * simulated) as f64;
+        let seconds = pace * slower * (pixels * simulated) as f64;
         Ok(json!({ "simulated": simulated, "seconds": seconds }))
     }
 

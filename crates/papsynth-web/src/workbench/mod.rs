@@ -48,11 +48,11 @@ const MAX_RECIPE: usize = 1 << 20;
 const MAX_IMAGE: usize = 1 << 27;
 
 /// Fraction of the memory for the images of the user.
-const REAL_MEMORY: f64 = 0.15;
+const REAL_MEMORY: f64 = 0.1;
 
 /// Fraction of the memory for the fields of a match.
 #[cfg(feature = "match")]
-const MATCH_MEMORY: f64 = 0.3;
+const MATCH_MEMORY: f64 = 0.25;
 
 /// What a workbench starts with.
 #[derive(Debug, Clone)]

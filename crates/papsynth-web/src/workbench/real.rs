@@ -65,6 +65,7 @@ impl RealImages {
     }
 
     /// Returns an image.
+    #[cfg(feature = "judge")]
     pub(super) fn get(&self, id: usize) -> Result<Arc<RealImage>, Reply> {
         self.images.get(&id).cloned().ok_or_else(|| Reply::error(404, "this image was removed"))
     }
@@ -92,7 +93,9 @@ impl RealImage {
     /// Decodes a PNG, JPEG or TIFF file.
     pub(super) fn decode(file: &[u8], limits: &Limits) -> Result<Self, Reply> {
         let image = LevelImage::decode(file, limits);
-        let image = image.map_err(|error| Reply::error(422, &error.to_string()))?;
+        let is_short = limits.max_pixels < Limits::default().max_pixels;
+        let help = if is_short { "; remove images, or start the program with a larger --max-memory" } else { "" };
+        let image = image.map_err(|error| Reply::error(422, &format!("{error}{help}")))?;
         let brightest = image.levels.iter().copied().max().unwrap_or(0);
         let bits = match image.white > u16::from(u8::MAX) {
             true => DEEP.into_iter().find(|bits| white_level(*bits) >= brightest).unwrap_or(u16::BITS),

@@ -68,7 +68,7 @@ impl ImageKind {
 /// Fraction of the memory for the frame of a recipe; the rest is for its smaller images and kept light.
 const FRAME_MEMORY: f64 = 0.5;
 
-/// Fraction of the memory for kept light.
+/// Fraction of the memory for kept light of images of full resolution; others have less by their pixels.
 const LIGHT_MEMORY: f64 = 0.125;
 
 /// Renders images.
@@ -104,15 +104,17 @@ struct Shown {
 
 impl Renderer {
     pub(super) fn new(params: &WorkbenchParams) -> Result<Self, Error> {
-        let live = || {
+        let live = |kind: ImageKind| {
             let mut live = Live::new(&params.model, &params.inputs)?;
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a fraction of a size")]
             if let Some(bytes) = params.max_memory {
-                live.set_max_light_bytes(Live::MAX_LIGHT_BYTES.min((bytes as f64 * LIGHT_MEMORY) as usize));
+                let light = (bytes as f64 * LIGHT_MEMORY) as usize / kind.factor().pow(2);
+                live.set_max_light_bytes(Live::MAX_LIGHT_BYTES.min(light));
             }
             Ok::<_, papsynth::Error>(live)
         };
-        let lives = [live()?, live()?, live()?, live()?];
+        let [full, reduced, coarse, small] = ImageKind::ALL.map(live);
+        let lives = [full?, reduced?, coarse?, small?];
         Ok(Self {
             model: params.model.clone(),
             threads: params.threads,

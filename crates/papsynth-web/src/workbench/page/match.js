@@ -9,6 +9,7 @@ const MATCH_MS = 500;
 const LEAST_REALS = 2;
 
 let matching = false;
+let plans = 0;
 
 const matchRequest = () => ({
   recipe: state.recipe,
@@ -23,6 +24,7 @@ async function planMatch() {
   element("match").hidden = !info.matches;
   element("no-match").hidden = info.matches;
   if (!info.matches) return;
+  const own = (plans += 1);
   element("match-start").disabled = matching || reals.length < LEAST_REALS;
   if (reals.length < LEAST_REALS) {
     element("match-plan").textContent = `Add ${LEAST_REALS} or more images of one size to find the recipe whose fields resemble them.`;
@@ -31,10 +33,11 @@ async function planMatch() {
   try {
     const asked = matchRequest();
     const { simulated, seconds } = await (await request("match/estimate", asked)).json();
+    if (own !== plans) return;
     element("match-plan").textContent =
       `Finds the recipe whose fields resemble these ${reals.length} images: ${simulated} simulated fields, about ${duration(seconds)}.`;
   } catch (error) {
-    element("match-plan").textContent = error.message;
+    if (own === plans) element("match-plan").textContent = error.message;
   }
 }
 
@@ -94,9 +97,9 @@ function useMatch({ fit, recipe }) {
     });
     return [made("h4", title(section)), made("ul", items)];
   });
-  const { before, after } = fit.distance;
+  const [before, after] = [fit.distance.before, fit.distance.after].map((distance) => distance.toFixed(2));
   element("match-found").replaceChildren(
-    made("p", `Distance to your images: ${round(before)} before, ${round(after)} after, in standard deviations between them. `
+    made("p", `Distance to your images: ${before} before, ${after} after, in standard deviations between them. `
       + "Each line: value before → mean over your images, and its 95 % interval."),
     ...lists.flat(),
     ...(lost.length ? [made("p", `No visible influence, unchanged: ${lost.map(({ path }) => path).join("; ")}.`, "quiet")] : []),
