@@ -125,11 +125,12 @@ enum DevCommand {
         #[arg(long)]
         full: bool,
     },
-    /// Tests `papsynth study`, `view` and `workbench` in headless Chromium, with keyboard and mouse
+    /// Tests `papsynth study`, `view` and `workbench`, and the site, in headless Chromium, with keyboard and mouse
     ///
     /// A short study with a restart of page and program: compares results with the clicks, and checks that all requests
     /// are to loopback and that no response contains an answer. The viewer with a focus stack: compares the canvas with
-    /// pixels and tables. Screenshots are in target/browser. Installs Chromium if it is missing, as root on Debian.
+    /// pixels and tables. The workbench of the program and that of the site: compares pixels with those of the command
+    /// line. Screenshots are in target/browser. Installs Chromium if it is missing, as root on Debian.
     Browser,
     /// Checks portable-numerics, the technique crates and the engine for wasm32, and compares hashes of their output,
     /// with Node

@@ -1,7 +1,7 @@
 "use strict";
 
-// A worker with an instance of the engine. The first message is { module, imagesBefore }; each further one is a request,
-// { number, head, body }, and gets a reply, { number, head, body } or { number, failure }.
+// A worker with an instance of the engine. The first message is { module, imagesBefore }; each further one is a
+// request, { number, head, body }, and gets a reply, { number, head, body } or { number, failure }.
 
 let engine = null;
 

@@ -73,8 +73,8 @@ impl Generate {
 
 /// Generate one field and show it next to its ground truth.
 ///
-/// Also prints the SHA-256 of the grey levels, of a focus stack those of its middle plane: one byte per sample, or two for
-/// cameras with more than 8 bits, least byte first. The page of `papsynth workbench` shows the same.
+/// Also prints the SHA-256 of the grey levels, of a focus stack those of its middle plane: one byte per sample, or two
+/// for cameras with more than 8 bits, least byte first. The page of `papsynth workbench` shows the same.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

@@ -3,7 +3,10 @@
 //! Compilers turn a transpose in plain Rust into gathers and scatters, which take six times as long as shuffles. This
 //! module therefore uses instructions of x86-64 where they exist. The result is the same: only data moves.
 
-#![expect(unsafe_code, reason = "vector instructions; a test compares them with the plain version")]
+#![cfg_attr(
+    target_arch = "x86_64",
+    expect(unsafe_code, reason = "vector instructions; a test compares them with the plain version")
+)]
 
 use super::Square;
 
