@@ -148,7 +148,8 @@ outdate = () => {
       for (const part of parts) part.inert = false;
     } catch (error) {
       button.disabled = false;
-      element("loading").textContent = `The engine cannot be loaded: ${error.message}.`;
+      const reason = location.protocol === "file:" ? "browsers load it from web servers only" : error.message;
+      element("loading").textContent = `The engine cannot be loaded: ${reason}.`;
     }
   });
 }

@@ -84,3 +84,17 @@ impl Frame {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn grey_levels_are_hashed_as_bytes() {
+        let grey: Vec<u16> = (0..10_000).map(|k| k % 251).collect();
+        let plane = Plane { grey: grey.clone(), ..Plane::default() };
+        let hex = |bytes: Vec<u8>| Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect::<String>();
+        assert_eq!(plane.sha256(8), hex(grey.iter().map(|level| level.to_le_bytes()[0]).collect()));
+        assert_eq!(plane.sha256(12), hex(grey.iter().flat_map(|level| level.to_le_bytes()).collect()));
+    }
+}

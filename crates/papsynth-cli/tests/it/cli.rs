@@ -390,6 +390,8 @@ fn preview_writes_one_image() {
     let bench = Bench::new("preview");
     let run = bench.good(&format!("preview --out look.png {TINY}"));
     assert!(run.out.contains("look.png: 96 x 80 px"), "{}", run.out);
+    let (_, hash) = run.out.split_once("SHA-256 of the grey levels: ").unwrap();
+    assert_eq!(hash.trim().len(), 64, "{}", run.out);
     let reader = png::Decoder::new(std::io::BufReader::new(fs::File::open(bench.path("look.png")).unwrap()));
     let info = reader.read_info().unwrap();
     assert_eq!(info.info().size(), (96 * 2 + 8, 80));

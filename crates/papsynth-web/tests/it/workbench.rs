@@ -78,6 +78,7 @@ fn images_have_the_pixels_of_an_engine() {
     let (head, samples) = unframed(&post(&mut workbench, "/render", &asked(&recipe, "full")));
     assert!(expected.planes[0].grey.iter().eq(&samples.iter().map(|&s| u16::from(s)).collect::<Vec<_>>()));
     assert_eq!(head["objects"], expected.finished.scene.objects.len());
+    assert_eq!(head["sha256"], expected.planes[0].sha256(8));
     // Ground truth of the same image.
     let id = head["id"].as_u64().unwrap();
     let truth = &expected.finished.truth;
