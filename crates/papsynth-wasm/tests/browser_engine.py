@@ -60,7 +60,7 @@ def main():
     browser = Workbench(chromium)
     try:
         browser.open(f"{origin}workbench/index.html")
-        browser.until("document.readyState === 'complete' && element('load')")
+        browser.until("document.readyState === 'complete' && element('load') !== null")
         browser.picture(folder / "start.png")
         assert not any(url.endswith((".zlib", "worker.js")) for url in browser.requests()), "the engine waits for the button"
         load(browser)
