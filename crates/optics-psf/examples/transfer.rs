@@ -20,6 +20,9 @@ const POINTS: u32 = 250;
 /// Depths, µm, with colour and dashes.
 const DEPTHS: [(f64, &str, &str); 3] = [(0.0, "#333", ""), (2.0, "#1f77b4", ""), (-2.0, "#d62728", "6 4")];
 
+/// A value at a frequency, cycles per µm.
+type Curve = fn(&Transfer, f64) -> f64;
+
 fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args().nth(1).unwrap_or_else(|| "target/transfer.svg".to_owned());
     let microscope = Microscope::new(&MicroscopeParams::default())?;
@@ -28,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut svg =
         String::from("<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 780 282' font-family='sans-serif' ");
     svg += "font-size='14'>\n<rect width='100%' height='100%' fill='white'/>\n";
-    let panels: [(&str, fn(&Transfer, f64) -> f64); 2] = [
+    let panels: [(&str, Curve); 2] = [
         ("Absorbance", |transfer, frequency| transfer.absorption([frequency, 0.0])[0]),
         ("Phase", |transfer, frequency| transfer.phase([frequency, 0.0])[0]),
     ];
