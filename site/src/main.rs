@@ -1,7 +1,8 @@
 //! Generates the documentation site: plain files that need no server.
 //!
-//! `papsynth-site ROOT PROGRAM ENGINE OUT [--no-pictures]` reads the pages of the repository in ROOT, asks the program for the
-//! schema and the presets, and replaces the folder OUT. ENGINE is the engine in WebAssembly. Links and anchors within the site are checked.
+//! `papsynth-site ROOT PROGRAM ENGINE OUT [--no-pictures]` reads the pages of the repository in ROOT, asks the program
+//! for the schema and the presets, and replaces the folder OUT. ENGINE is the engine in WebAssembly. Links and anchors
+//! within the site are checked.
 
 #![forbid(unsafe_code)]
 #![expect(clippy::print_stdout, reason = "a command line program")]

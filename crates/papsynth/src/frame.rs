@@ -51,8 +51,8 @@ pub fn white_level(bits: u32) -> u16 {
 }
 
 impl Plane {
-    /// Returns the SHA-256 of the [grey levels](Self::grey) in hexadecimal digits: of one byte per sample, or of two for
-    /// cameras with more than 8 bits, least byte first.
+    /// Returns the SHA-256 of the [grey levels](Self::grey) in hexadecimal digits: of one byte per sample, or of two
+    /// for cameras with more than 8 bits, least byte first.
     #[must_use]
     pub fn sha256(&self, bits: u32) -> String {
         let bytes = if bits > u8::BITS { 2 } else { 1 };
