@@ -12,8 +12,7 @@ use crate::workspace::Workspace;
 /// The pages are those of site/pages, docs and the READMEs; a reference of recipes, from their schema; and a gallery
 /// with a field of each preset. `papsynth` renders the pictures of galleries and physics. The folder workbench is the
 /// page of `papsynth workbench` with the engine in WebAssembly (target wasm32-unknown-unknown); any server of files can
-/// host it. Fails if a link or an anchor within the site does not exist.
-/// `cargo xtask browser` opens all pages.
+/// host it. Fails if a link or an anchor within the site does not exist. `cargo xtask browser` opens all pages.
 #[derive(clap::Args)]
 pub(crate) struct Site {
     /// Leaves out the pictures that commands of the pages make

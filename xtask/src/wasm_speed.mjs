@@ -2,6 +2,7 @@
 // node wasm_speed.mjs ENGINE PAPSYNTH FIELDS
 import { spawn } from "node:child_process";
 import { readFileSync } from "node:fs";
+import { request } from "node:http";
 
 const [engine, program, fields] = process.argv.slice(2);
 
@@ -13,10 +14,10 @@ instance.start(0);
 function ours(method, target, body) {
   const head = Buffer.from(JSON.stringify({ method, target, content_type: "application/json" }));
   const start = instance.request(4 + head.length + body.length);
-  const request = Buffer.from(instance.memory.buffer, start, 4 + head.length + body.length);
-  request.writeUInt32LE(head.length);
-  head.copy(request, 4);
-  Buffer.from(body).copy(request, 4 + head.length);
+  const message = Buffer.from(instance.memory.buffer, start, 4 + head.length + body.length);
+  message.writeUInt32LE(head.length);
+  head.copy(message, 4);
+  Buffer.from(body).copy(message, 4 + head.length);
   const reply = instance.reply();
   const whole = Buffer.from(instance.memory.buffer, reply, instance.reply_length());
   return unframed(whole)[1];
@@ -40,15 +41,25 @@ const server = spawn(program, ["workbench", "--threads", "1"], { stdio: ["ignore
 const address = await new Promise((resolve) => {
   server.stdout.on("data", (text) => resolve(String(text).match(/http:\/\/[^ ]+\//)[0]));
 });
-const { recipe } = await (await fetch(`${address}info`)).json();
+
+/** Returns the body of the reply of the program, on a connection of its own: it closes idle ones. */
+const theirs = (path, method, body) => new Promise((resolve, reject) => {
+  const headers = { "Content-Type": "application/json" };
+  const asked = request(address + path, { method, headers, agent: false }, async (response) => {
+    const parts = [];
+    for await (const part of response) parts.push(part);
+    resolve(Buffer.concat(parts));
+  });
+  asked.on("error", reject);
+  asked.end(body);
+});
+const { recipe } = JSON.parse(await theirs("info", "GET"));
 
 const [times, walls] = [[0, 0], [[], []]];
 for (let index = 0; index <= Number(fields); index += 1) {
   const body = JSON.stringify({ recipe, seed: 0, index, view: "full", focus_um: null, noise_free: false });
   const before = nativeMs(server.pid);
-  const headers = { "Content-Type": "application/json" };
-  const response = await fetch(`${address}render`, { method: "POST", headers, body });
-  const [theirs, pixels] = unframed(Buffer.from(await response.arrayBuffer()));
+  const [other, pixels] = unframed(await theirs("render", "POST", body));
   const between = [nativeMs(server.pid), ownMs()];
   const [found, own] = unframed(ours("POST", "/render", body));
   const after = ownMs();
@@ -57,7 +68,7 @@ for (let index = 0; index <= Number(fields); index += 1) {
   if (index === 0) continue;
   times[0] += between[0] - before;
   times[1] += after - between[1];
-  walls[0].push(theirs.ms);
+  walls[0].push(other.ms);
   walls[1].push(found.ms);
 }
 server.kill("SIGINT");
