@@ -8,10 +8,7 @@ use anyhow::{Context, Result};
 use serde_json::Value;
 
 use crate::shell::{self, skipped};
-use crate::workspace::Workspace;
-
-/// The crate of the released program.
-const PROGRAM: &str = "papsynth-cli";
+use crate::workspace::{PROGRAM, Workspace};
 
 pub(crate) fn deny(workspace: &Workspace, checks: &[String]) -> Result<()> {
     let mut command = tool(workspace, "cargo-deny", "0.20.2")?;
@@ -52,7 +49,7 @@ pub(crate) fn bill(workspace: &Workspace) -> Result<PathBuf> {
 }
 
 /// Returns a program, which Cargo installs below the target folder if this version is missing.
-fn tool(workspace: &Workspace, name: &str, version: &str) -> Result<Command> {
+pub(crate) fn tool(workspace: &Workspace, name: &str, version: &str) -> Result<Command> {
     let root = workspace.target.join("tools");
     let installed = fs::read_to_string(root.join(".crates.toml")).unwrap_or_default();
     if !installed.contains(&format!("\"{name} {version} ")) {
@@ -67,13 +64,18 @@ fn tool(workspace: &Workspace, name: &str, version: &str) -> Result<Command> {
     Ok(command)
 }
 
+/// Returns the folder in which Cargo unpacks crates of registries.
+pub(crate) fn sources() -> PathBuf {
+    let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home = home.or_else(|| std::env::home_dir().map(|home| home.join(".cargo"))).unwrap_or_default();
+    home.join("registry/src")
+}
+
 /// Packages every crate and builds it from its package.
 ///
 /// Removes packages that an earlier run has unpacked and built, because Cargo would reuse them for the same version.
 pub(crate) fn publish(workspace: &Workspace) -> Result<()> {
-    let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
-    let home = home.or_else(|| std::env::home_dir().map(|home| home.join(".cargo"))).unwrap_or_default();
-    for registry in fs::read_dir(home.join("registry/src")).into_iter().flatten().flatten() {
+    for registry in fs::read_dir(sources()).into_iter().flatten().flatten() {
         // The temporary registry of such a run has no host, so that its name begins with a dash.
         if registry.file_name().to_string_lossy().starts_with('-') {
             shell::remove(&registry.path())?;
