@@ -11,7 +11,7 @@ use crate::shell::{self, skipped};
 use crate::workspace::{PROGRAM, Workspace};
 
 pub(crate) fn deny(workspace: &Workspace, checks: &[String]) -> Result<()> {
-    let mut command = tool(workspace, "cargo-deny", "0.20.2")?;
+    let mut command = tool(workspace, "cargo-deny", "0.20.2", "")?;
     command.args(["--locked", "check"]).args(checks);
     if checks.is_empty() {
         command.args(["bans", "licenses", "sources"]);
@@ -27,7 +27,7 @@ pub(crate) fn sbom(workspace: &Workspace) -> Result<()> {
 /// Writes the bill of materials and returns its path.
 pub(crate) fn bill(workspace: &Workspace) -> Result<PathBuf> {
     const NAME: &str = "papsynth.cdx";
-    let mut command = tool(workspace, "cargo-cyclonedx", "0.5.9")?;
+    let mut command = tool(workspace, "cargo-cyclonedx", "0.5.9", "")?;
     command.args(["cyclonedx", "--format", "json", "--spec-version", "1.5", "--all-features", "--target", "all"]);
     // This variable suppresses the serial number.
     shell::run(command.args(["--override-filename", NAME]).env("SOURCE_DATE_EPOCH", "0"))?;
@@ -48,15 +48,15 @@ pub(crate) fn bill(workspace: &Workspace) -> Result<PathBuf> {
     Ok(path)
 }
 
-/// Returns a program, which Cargo installs below the target folder if this version is missing.
-pub(crate) fn tool(workspace: &Workspace, name: &str, version: &str) -> Result<Command> {
+/// Returns a program, which Cargo installs with these features below the target folder if this version is missing.
+pub(crate) fn tool(workspace: &Workspace, name: &str, version: &str, features: &str) -> Result<Command> {
     let root = workspace.target.join("tools");
     let installed = fs::read_to_string(root.join(".crates.toml")).unwrap_or_default();
     if !installed.contains(&format!("\"{name} {version} ")) {
         let mut command = workspace.cargo();
         // Without optimisation, which would take longer than it saves.
-        command.args(["install", name, "--version", &format!("={version}"), "--locked", "--debug", "--root"]);
-        shell::run(command.arg(&root))
+        command.args(["install", name, "--version", &format!("={version}"), "--features", features, "--locked"]);
+        shell::run(command.args(["--debug", "--root"]).arg(&root))
             .map_err(|error| skipped(format!("{name} {version} cannot be installed: {error}")))?;
     }
     let mut command = Command::new(root.join("bin").join(name));

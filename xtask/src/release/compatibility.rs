@@ -19,7 +19,7 @@ pub(super) fn interfaces(workspace: &Workspace) -> Result<()> {
         println!("There is no earlier release to compare with: no tag `v…` of another version.");
         return Ok(());
     };
-    let mut checks = supply::tool(workspace, "cargo-semver-checks", "0.51.0")?;
+    let mut checks = supply::tool(workspace, "cargo-semver-checks", "0.51.0", "")?;
     checks.args(["semver-checks", "--workspace", "--baseline-rev", baseline]);
     shell::run(checks.env("CARGO_TARGET_DIR", workspace.target.join("semver-checks")))
 }

@@ -25,7 +25,7 @@ pub(super) fn write(workspace: &Workspace) -> Result<()> {
     // With --frozen, cargo-about reads only the unpacked crates.
     shell::run(workspace.cargo().args(["fetch", "--locked"]))?;
     for folder in [&format!("crates/{PROGRAM}"), package::PACKAGE] {
-        let mut about = supply::tool(workspace, "cargo-about", "0.9.3")?;
+        let mut about = supply::tool(workspace, "cargo-about", "0.9.3", "cli")?;
         about.args(["about", "generate", "--frozen", "--all-features", "--fail"]);
         about.arg("--config").arg(&settings).arg("--manifest-path").arg(workspace.root.join(folder).join("Cargo.toml"));
         about.arg("--output-file").arg(written(workspace, folder));

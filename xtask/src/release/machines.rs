@@ -111,6 +111,7 @@ fn check_program(workspace: &Workspace, machine: &Machine, target: &str) -> Resu
     shell::remove(&folder)?;
     shell::make(&folder)?;
     let archive = programs::archived(workspace, target)?;
+    ensure!(archive.exists(), "{}: no such file; run the step `programs`", workspace.shown(&archive));
     shell::run(Command::new("tar").arg("-xzf").arg(archive).arg("--strip-components=1").arg("-C").arg(&folder))?;
     let formats = format!("--format {LIGHT_FORMATS},{HEAVY_FORMATS}");
     let own = super::work(workspace, "own/all");
