@@ -42,7 +42,7 @@ const TRAINERS: [(&str, &str, &str); 2] = [
 pub(crate) const PACKAGE: &str = "crates/papsynth-python";
 
 pub(crate) fn run(workspace: &Workspace) -> Result<()> {
-    let wheel = wheel(workspace, "wheels", &[])?;
+    let wheel = wheel(workspace)?;
     test(workspace, &wheel, &program(workspace)?)?;
     napari(workspace, &wheel)
 }
@@ -72,7 +72,7 @@ fn napari(workspace: &Workspace, wheel: &Path) -> Result<()> {
 
 /// Runs every training script for a few steps. Both environments are tried, also if the first cannot be installed.
 pub(crate) fn training(workspace: &Workspace) -> Result<()> {
-    let wheel = wheel(workspace, "wheels", &[])?;
+    let wheel = wheel(workspace)?;
     let test = workspace.root.join(PACKAGE).join("tests/test_training.py");
     let mut missing = Ok(());
     for (name, packages, scripts) in TRAINERS {
@@ -96,7 +96,7 @@ pub(crate) fn training(workspace: &Workspace) -> Result<()> {
 }
 
 pub(crate) fn cluster(workspace: &Workspace) -> Result<()> {
-    let wheel = wheel(workspace, "wheels", &[])?;
+    let wheel = wheel(workspace)?;
     let python = installed(workspace, "cluster", ENGINES, &wheel)?;
     let folder = workspace.target.join("cluster");
     let run = |script: &str, arguments: &[&Path]| {
@@ -115,13 +115,17 @@ pub(crate) fn cluster(workspace: &Workspace) -> Result<()> {
     run("cluster_slurm.py", &[&program, &folder.join("slurm"), &folder.join("dask/root.txt")])
 }
 
-/// Builds the wheel in a folder below the target folder, which is replaced.
-pub(crate) fn wheel(workspace: &Workspace, folder: &str, more: &[&str]) -> Result<PathBuf> {
+/// Builds the wheel for this machine in target/wheels.
+fn wheel(workspace: &Workspace) -> Result<PathBuf> {
+    built(workspace, "wheels", builder(workspace, "maturin")?.args(["build", "--release"]))
+}
+
+/// Runs a command that builds a wheel, in a folder below the target folder, which is replaced.
+pub(crate) fn built(workspace: &Workspace, folder: &str, maturin: &mut Command) -> Result<PathBuf> {
     let out = workspace.target.join(folder);
     shell::remove(&out)?;
-    let mut maturin = builder(workspace, "maturin")?;
-    maturin.args(["build", "--release"]).args(more).arg("--out").arg(&out);
-    shell::run(maturin.env("CARGO_TARGET_DIR", &workspace.target).current_dir(workspace.root.join(PACKAGE)))?;
+    maturin.arg("--out").arg(&out).env("CARGO_TARGET_DIR", &workspace.target);
+    shell::run(maturin.current_dir(workspace.root.join(PACKAGE)))?;
     let mut wheels = fs::read_dir(&out).with_context(|| format!("cannot read {}", out.display()))?;
     Ok(wheels.next().with_context(|| format!("no wheel in {}", workspace.shown(&out)))??.path())
 }

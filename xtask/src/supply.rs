@@ -71,7 +71,7 @@ pub(crate) fn sources() -> PathBuf {
     home.join("registry/src")
 }
 
-/// Packages every crate and builds it from its package.
+/// Packages every crate that is published, in target/package, and builds it from its package.
 ///
 /// Removes packages that an earlier run has unpacked and built, because Cargo would reuse them for the same version.
 pub(crate) fn publish(workspace: &Workspace) -> Result<()> {
@@ -81,8 +81,8 @@ pub(crate) fn publish(workspace: &Workspace) -> Result<()> {
             shell::remove(&registry.path())?;
         }
     }
-    let crates = workspace.root.join("crates");
-    let own = workspace.packages.iter().filter(|package| package.folder().starts_with(&crates));
-    shell::run(workspace.cargo().arg("clean").args(own.flat_map(|package| ["--package", &package.name])))?;
-    shell::run(workspace.cargo().args(["publish", "--workspace", "--dry-run", "--allow-dirty"]))
+    let published = workspace.packages.iter().filter(|package| package.is_published());
+    let names: Vec<&str> = published.flat_map(|package| ["--package", &package.name]).collect();
+    shell::run(workspace.cargo().arg("clean").args(&names))?;
+    shell::run(workspace.cargo().args(["package", "--locked", "--allow-dirty"]).args(&names))
 }

@@ -43,6 +43,7 @@ pub(crate) struct Package {
     pub(crate) version: String,
     /// The oldest Rust that compiles it.
     pub(crate) rust_version: String,
+    pub(crate) repository: Option<String>,
     /// Package ID.
     pub(crate) id: String,
     features: BTreeMap<String, IgnoredAny>,

@@ -12,7 +12,11 @@ const UNRELEASED: &str = "Unreleased";
 
 /// Checks that everything is committed and that all files state the same version. Returns the release notes.
 pub(super) fn check(workspace: &Workspace, trial: bool) -> Result<String> {
-    let version = &workspace.released()?.version;
+    let package = workspace.released()?;
+    let version = &package.version;
+    if package.repository.as_deref().unwrap_or_default().is_empty() {
+        println!("Cargo.toml: `repository` is empty. Fill it in before publishing; docs/RELEASING.md tells more.");
+    }
     let citation = shell::read(&workspace.root.join("CITATION.cff"))?;
     let is_cited = citation.lines().any(|line| line == format!("version: {version}"));
     ensure!(is_cited, "CITATION.cff: expected `version: {version}`, the version in Cargo.toml");

@@ -40,8 +40,10 @@ pub(super) fn build(workspace: &Workspace) -> Result<()> {
 fn build_wheel(workspace: &Workspace, processor: &str) -> Result<()> {
     let target = format!("{processor}-unknown-linux-gnu");
     need_target(&target)?;
-    let more = ["--locked", "--zig", "--compatibility", PLATFORM, "--target", &target];
-    let wheel = package::wheel(workspace, "release-work/wheel", &more)?;
+    let mut maturin = package::builder(workspace, "maturin")?;
+    maturin.args(["build", "--release", "--locked", "--zig", "--compatibility", PLATFORM, "--target", &target]);
+    maturin.env("RUSTFLAGS", programs::without_paths());
+    let wheel = package::built(workspace, "release-work/wheel", &mut maturin)?;
     let name = wheel.file_name().unwrap_or_default();
     shell::copy(&wheel, &files(workspace).join(name))
 }
@@ -57,7 +59,7 @@ fn build_source(workspace: &Workspace) -> Result<()> {
     let source = file(workspace, ".tar.gz")?;
     shell::run(Command::new("tar").arg("-xzf").arg(source).arg("--strip-components=1").arg("-C").arg(&unpacked))?;
     let mut cargo = workspace.cargo();
-    cargo.args(["check", "--locked", "--manifest-path"]).arg(unpacked.join(package::PACKAGE).join("Cargo.toml"));
+    cargo.args(["check", "--offline", "--manifest-path"]).arg(unpacked.join(package::PACKAGE).join("Cargo.toml"));
     shell::run(cargo.env("CARGO_TARGET_DIR", &workspace.target))
 }
 
