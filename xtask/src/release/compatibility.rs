@@ -35,7 +35,8 @@ pub(super) fn oldest_rust(workspace: &Workspace) -> Result<()> {
     let installed = || shell::succeeds(Command::new("rustup").args(["run", oldest, "rustc", "--version"]));
     let install =
         || shell::succeeds(Command::new("rustup").args(["toolchain", "install", oldest, "--profile=minimal"]));
-    if !installed() && !(install() && installed()) {
+    let is_ready = installed() || install() && installed();
+    if !is_ready {
         return Err(skipped(format!("Rust {oldest} is not installed, and rustup cannot install it")));
     }
     let mut cargo = Command::new("rustup");

@@ -28,8 +28,9 @@ pub(super) fn build(workspace: &Workspace) -> Result<()> {
         cargo.args(["zigbuild", "--locked", "--release", "--package", PROGRAM, "--all-features", "--target", target]);
         shell::run(cargo.env("RUSTFLAGS", without_paths()).current_dir(&workspace.root))?;
         ensure_static(&program(workspace, target))?;
+        archive(workspace, target)?;
     }
-    TARGETS.into_iter().try_for_each(|target| archive(workspace, target))
+    Ok(())
 }
 
 /// Returns the path of the program that [`build`] compiles.
@@ -72,7 +73,7 @@ fn archive(workspace: &Workspace, target: &str) -> Result<()> {
     }
     let texts = licences::written(workspace, &format!("crates/{PROGRAM}"));
     shell::copy(&texts, &folder.join(licences::NAME))?;
-    // Both programs have the same command line; this machine runs the first.
+    // All programs have the same command line; this machine runs the first.
     let papsynth = || Command::new(program(workspace, TARGETS[0]));
     for (language, file) in COMPLETIONS {
         let script = shell::output(papsynth().args(["completions", language]))?;
