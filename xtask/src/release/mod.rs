@@ -37,8 +37,7 @@ const STEPS: [Step; 11] = [
 /// Static programs and wheels for Linux on x86-64 and aarch64, a source distribution for Python, all crates, licences
 /// of the dependencies, the bill of materials, release notes and checksums. The programs run in a Debian without Rust
 /// and in an empty folder, the wheels in a Debian without Rust; files for aarch64 run in an emulator. All must give
-/// the same data set. docs/RELEASING.md describes the files and the steps. Takes an hour on 2 cores from scratch. Only
-/// for Linux on x86-64, as root.
+/// the same data set. docs/RELEASING.md describes the files and the steps. Only for Linux on x86-64, as root.
 #[derive(clap::Args)]
 pub(crate) struct Release {
     /// Accepts uncommitted changes, and takes the notes of a version without a date from Unreleased in CHANGELOG.md
