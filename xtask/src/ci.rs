@@ -3,16 +3,14 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::{Duration, Instant};
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Result, bail};
 
 use crate::bench::counts;
-use crate::shell::{self, Skipped, skipped};
+use crate::shell::{self, skipped};
+use crate::steps::{self, Step};
 use crate::workspace::Workspace;
 use crate::{browser, dataset, deps, equations, external, hashes, package, prose, site, supply, test, vectors};
-
-type Step = (&'static str, fn(&Workspace) -> Result<()>);
 
 /// In order of increasing time. The golden images are part of the tests.
 const STEPS: [Step; 15] = [
@@ -73,27 +71,8 @@ fn covered(workspace: &Workspace) -> Vec<String> {
 }
 
 pub(crate) fn run(workspace: &Workspace, full: bool) -> Result<()> {
-    let mut table = String::new();
-    let mut failed = Vec::new();
-    let mut total = Duration::ZERO;
     let further: &[Step] = if full { &FULL } else { &[] };
-    for &(name, step) in STEPS.iter().chain(further) {
-        println!("\n== {name} ==");
-        let (outcome, time) = timed(|| step(workspace));
-        total += time;
-        let words = match outcome {
-            Ok(()) => "passed".to_owned(),
-            Err(error) if error.is::<Skipped>() => format!("skipped: {error}"),
-            Err(error) => {
-                failed.push(name);
-                format!("FAILED: {error:#}")
-            }
-        };
-        println!("{words}");
-        table.push_str(&format!("{name:<18} {:>6.0} s  {words}\n", time.as_secs_f64()));
-    }
-    println!("\n{table}{:<18} {:>6.0} s", "total", total.as_secs_f64());
-    ensure!(failed.is_empty(), "failed: {}", failed.join(", "));
+    steps::run(workspace, STEPS.iter().chain(further))?;
     if full {
         return record(workspace);
     }
@@ -140,12 +119,6 @@ fn required(workspace: &Workspace) -> String {
         }
         Err(error) => format!("--full may be required: {error}"),
     }
-}
-
-#[expect(clippy::disallowed_methods, reason = "the time is only printed")]
-fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
-    let start = Instant::now();
-    (work(), start.elapsed())
 }
 
 /// Reports whether tests with real images are skipped.

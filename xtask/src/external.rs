@@ -26,10 +26,10 @@ const MEASURERS: &str = "numpy\npillow\nemva1288==1.0.2\n";
 
 const SMALL: [&str; 4] = ["--set", "field.width_px=400", "--set", "field.height_px=300"];
 
-const LIGHT_FORMATS: &str = "folder,webdataset,ome-tiff,cellpose,stardist,yolo-seg,qupath";
+pub(crate) const LIGHT_FORMATS: &str = "folder,webdataset,ome-tiff,cellpose,stardist,yolo-seg,qupath";
 
 /// Those that heavy crates write.
-const HEAVY_FORMATS: &str = "ome-zarr,huggingface";
+pub(crate) const HEAVY_FORMATS: &str = "ome-zarr,huggingface";
 
 /// A frame whose pyramid has several levels.
 const LARGE: [&str; 8] =

@@ -49,11 +49,7 @@ fn on_other_processors(workspace: &Workspace) -> Result<()> {
 
 /// Compares hashes of a program compiled for aarch64.
 fn on_aarch64(workspace: &Workspace) -> Result<()> {
-    let emulator =
-        || ["qemu-aarch64", "qemu-aarch64-static"].into_iter().find(|name| shell::answers(name, "--version"));
-    let Some(emulator) = shell::find_or_install(emulator, &["qemu-user-static"]) else {
-        return Err(skipped("qemu-user is not installed and cannot be installed"));
-    };
+    let emulator = emulator()?;
     need_target(AARCH64)?;
     let folder = workspace.target.join("hashes");
     let mut command = workspace.cargo();
@@ -61,6 +57,14 @@ fn on_aarch64(workspace: &Workspace) -> Result<()> {
     shell::run(command.env("CARGO_TARGET_AARCH64_UNKNOWN_LINUX_MUSL_LINKER", "rust-lld"))?;
     let program = folder.join(AARCH64).join("debug").join(PACKAGE);
     compare(workspace, Command::new(emulator).arg(program), "aarch64")
+}
+
+/// Returns a program that runs programs for aarch64.
+pub(crate) fn emulator() -> Result<&'static str> {
+    let names = ["qemu-aarch64", "qemu-aarch64-static"];
+    let find = || names.into_iter().find(|name| shell::answers(name, "--version"));
+    shell::find_or_install(find, &["qemu-user-static"])
+        .ok_or_else(|| skipped("qemu-user is not installed and cannot be installed"))
 }
 
 /// Checks the crates without files and threads for wasm32, and compares hashes.

@@ -17,8 +17,10 @@ mod peers;
 mod prose;
 mod python;
 mod realism;
+mod release;
 mod shell;
 mod site;
+mod steps;
 mod supply;
 mod test;
 mod vectors;
@@ -37,8 +39,8 @@ use crate::workspace::Workspace;
 #[derive(Parser)]
 #[command(bin_name = "cargo xtask", max_term_width = 100)]
 #[command(
-    after_help = "A step is skipped with a message if a requirement (Python and its packages, Chromium, Node, valgrind, Slurm, a \
-                        target of rustc) is missing and cannot be installed. If the variable CI is set, it fails instead."
+    after_help = "A step is skipped with a message if a requirement (Python and its packages, Chromium, Node, valgrind, Slurm, \
+                        targets of rustc) is missing and cannot be installed. If the variable CI is set, it fails instead."
 )]
 enum DevCommand {
     /// Generates eight labelled fields and one focus stack of the default recipe
@@ -170,11 +172,7 @@ enum DevCommand {
     /// The root hash must equal that of one process. The object store is a local server that rejects requests and drops
     /// responses. Slurm is installed as root on Debian, and runs below /tmp during the test.
     Cluster,
-    /// Builds a wheel for glibc 2.28 and a static program in target/releases, and tests both
-    ///
-    /// The program needs no system library (x86_64-unknown-linux-musl); its output must equal that of the wheel. Run it
-    /// before a release: it builds both from scratch. Only for Linux on x86-64.
-    Releases,
+    Release(release::Release),
     /// Runs all checks for a change, at most 20 minutes on 2 cores from scratch
     ///
     /// Formatting, lints, the test suite with golden images, documentation, rules of the workspace, instruction counts,
@@ -233,7 +231,7 @@ fn run(command: DevCommand) -> Result<()> {
         DevCommand::Python => package::run(workspace),
         DevCommand::Training => package::training(workspace),
         DevCommand::Cluster => package::cluster(workspace),
-        DevCommand::Releases => package::releases(workspace),
+        DevCommand::Release(options) => release::run(workspace, &options),
         DevCommand::Ci { full } => ci::run(workspace, full),
         DevCommand::Torture(numbers) => test::torture(workspace, &numbers),
     }

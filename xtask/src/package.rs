@@ -4,13 +4,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 
 use crate::python;
 use crate::shell::{self, Skipped, skipped};
 use crate::workspace::Workspace;
 
-const BUILDER: &str = "maturin>=1.9,<2\nziglang\n";
+/// Programs that build wheels and compile for other systems, with zig as compiler and linker of C.
+const BUILDERS: &str = "maturin>=1.9,<2\nziglang\ncargo-zigbuild\n";
 
 const TESTERS: &str = "numpy\npillow\npytest\nscipy\nscikit-learn\nipython\n";
 
@@ -38,40 +39,16 @@ const TRAINERS: [(&str, &str, &str); 2] = [
     ),
 ];
 
-/// Target of the static program.
-const STATIC_TARGET: &str = "x86_64-unknown-linux-musl";
-
-/// Linux since 2019: Debian 10, Ubuntu 20.04, RHEL 8 and newer.
-const MANYLINUX: [&str; 5] = ["--zig", "--compatibility", "manylinux_2_28", "--target", "x86_64-unknown-linux-gnu"];
-
-const PACKAGE: &str = "crates/papsynth-python";
+pub(crate) const PACKAGE: &str = "crates/papsynth-python";
 
 pub(crate) fn run(workspace: &Workspace) -> Result<()> {
-    let wheel = wheel(workspace, "wheels", &[])?;
+    let wheel = wheel(workspace)?;
     test(workspace, &wheel, &program(workspace)?)?;
     napari(workspace, &wheel)
 }
 
-pub(crate) fn releases(workspace: &Workspace) -> Result<()> {
-    if !cfg!(all(target_os = "linux", target_arch = "x86_64")) {
-        return Err(skipped("releases can only be built on Linux for x86-64"));
-    }
-    shell::need_target(STATIC_TARGET)?;
-    let wheel = wheel(workspace, "releases", &MANYLINUX)?;
-    shell::run(workspace.cargo().args(["build", "--release", "--package", "papsynth-cli", "--target", STATIC_TARGET]))?;
-    let program = workspace.target.join("releases/papsynth");
-    shell::copy(&workspace.target.join(STATIC_TARGET).join("release/papsynth"), &program)?;
-    // A dynamically linked program contains the name of its loader.
-    let bytes = fs::read(&program)?;
-    ensure!(!bytes.windows(9).any(|word| word == b"/ld-linux" || word == b"/ld-musl-"), "papsynth is not static");
-    for path in [&wheel, &program] {
-        println!("{} ({:.1} MB)", workspace.shown(path), fs::metadata(path)?.len() as f64 / 1e6);
-    }
-    test(workspace, &wheel, &program)
-}
-
 /// Runs the tests of the package with an installed wheel and the command line program.
-fn test(workspace: &Workspace, wheel: &Path, program: &Path) -> Result<()> {
+pub(crate) fn test(workspace: &Workspace, wheel: &Path, program: &Path) -> Result<()> {
     let tests = ["test_package.py", "test_display.py", "test_examples.py"];
     let tests = tests.map(|name| workspace.root.join(PACKAGE).join("tests").join(name));
     let mut pytest = Command::new(installed(workspace, "package", TESTERS, wheel)?);
@@ -95,7 +72,7 @@ fn napari(workspace: &Workspace, wheel: &Path) -> Result<()> {
 
 /// Runs every training script for a few steps. Both environments are tried, also if the first cannot be installed.
 pub(crate) fn training(workspace: &Workspace) -> Result<()> {
-    let wheel = wheel(workspace, "wheels", &[])?;
+    let wheel = wheel(workspace)?;
     let test = workspace.root.join(PACKAGE).join("tests/test_training.py");
     let mut missing = Ok(());
     for (name, packages, scripts) in TRAINERS {
@@ -119,7 +96,7 @@ pub(crate) fn training(workspace: &Workspace) -> Result<()> {
 }
 
 pub(crate) fn cluster(workspace: &Workspace) -> Result<()> {
-    let wheel = wheel(workspace, "wheels", &[])?;
+    let wheel = wheel(workspace)?;
     let python = installed(workspace, "cluster", ENGINES, &wheel)?;
     let folder = workspace.target.join("cluster");
     let run = |script: &str, arguments: &[&Path]| {
@@ -138,24 +115,34 @@ pub(crate) fn cluster(workspace: &Workspace) -> Result<()> {
     run("cluster_slurm.py", &[&program, &folder.join("slurm"), &folder.join("dask/root.txt")])
 }
 
-/// Builds the wheel in a folder below the target folder, which is replaced.
-fn wheel(workspace: &Workspace, folder: &str, more: &[&str]) -> Result<PathBuf> {
-    let python = python::environment(workspace, "maturin", BUILDER)?;
+/// Builds the wheel for this machine in target/wheels.
+fn wheel(workspace: &Workspace) -> Result<PathBuf> {
+    built(workspace, "wheels", builder(workspace, "maturin")?.args(["build", "--release"]))
+}
+
+/// Runs a command that builds a wheel, in a folder below the target folder, which is replaced.
+pub(crate) fn built(workspace: &Workspace, folder: &str, maturin: &mut Command) -> Result<PathBuf> {
     let out = workspace.target.join(folder);
     shell::remove(&out)?;
-    // maturin looks for zig in PATH.
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    let own = python.parent().map(Path::to_owned).into_iter();
-    let path = std::env::join_paths(own.chain(std::env::split_paths(&path)))?;
-    let mut command = Command::new(&python);
-    command.args(["-m", "maturin", "build", "--release"]).args(more).arg("--out").arg(&out).env("PATH", path);
-    shell::run(command.env("CARGO_TARGET_DIR", &workspace.target).current_dir(workspace.root.join(PACKAGE)))?;
+    maturin.arg("--out").arg(&out).env("CARGO_TARGET_DIR", &workspace.target);
+    shell::run(maturin.current_dir(workspace.root.join(PACKAGE)))?;
     let mut wheels = fs::read_dir(&out).with_context(|| format!("cannot read {}", out.display()))?;
     Ok(wheels.next().with_context(|| format!("no wheel in {}", workspace.shown(&out)))??.path())
 }
 
+/// Returns one of [`BUILDERS`], with zig in its PATH.
+pub(crate) fn builder(workspace: &Workspace, name: &str) -> Result<Command> {
+    let python = python::environment(workspace, "maturin", BUILDERS)?;
+    let folder = python.parent().unwrap_or(&python);
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let path = std::env::join_paths(std::iter::once(folder.to_owned()).chain(std::env::split_paths(&path)))?;
+    let mut command = Command::new(folder.join(name));
+    command.env("PATH", path);
+    Ok(command)
+}
+
 /// Returns the Python of an environment with these packages and the wheel, which is reinstalled.
-fn installed(workspace: &Workspace, name: &str, packages: &str, wheel: &Path) -> Result<PathBuf> {
+pub(crate) fn installed(workspace: &Workspace, name: &str, packages: &str, wheel: &Path) -> Result<PathBuf> {
     let python = python::environment(workspace, name, packages)?;
     shell::run(python::pip(&python, "install").args(["--force-reinstall", "--no-deps"]).arg(wheel))?;
     Ok(python)

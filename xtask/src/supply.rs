@@ -8,13 +8,10 @@ use anyhow::{Context, Result};
 use serde_json::Value;
 
 use crate::shell::{self, skipped};
-use crate::workspace::Workspace;
-
-/// The crate of the released program.
-const PROGRAM: &str = "papsynth-cli";
+use crate::workspace::{PROGRAM, Workspace};
 
 pub(crate) fn deny(workspace: &Workspace, checks: &[String]) -> Result<()> {
-    let mut command = tool(workspace, "cargo-deny", "0.20.2")?;
+    let mut command = tool(workspace, "cargo-deny", "0.20.2", "")?;
     command.args(["--locked", "check"]).args(checks);
     if checks.is_empty() {
         command.args(["bans", "licenses", "sources"]);
@@ -30,7 +27,7 @@ pub(crate) fn sbom(workspace: &Workspace) -> Result<()> {
 /// Writes the bill of materials and returns its path.
 pub(crate) fn bill(workspace: &Workspace) -> Result<PathBuf> {
     const NAME: &str = "papsynth.cdx";
-    let mut command = tool(workspace, "cargo-cyclonedx", "0.5.9")?;
+    let mut command = tool(workspace, "cargo-cyclonedx", "0.5.9", "")?;
     command.args(["cyclonedx", "--format", "json", "--spec-version", "1.5", "--all-features", "--target", "all"]);
     // This variable suppresses the serial number.
     shell::run(command.args(["--override-filename", NAME]).env("SOURCE_DATE_EPOCH", "0"))?;
@@ -51,15 +48,15 @@ pub(crate) fn bill(workspace: &Workspace) -> Result<PathBuf> {
     Ok(path)
 }
 
-/// Returns a program, which Cargo installs below the target folder if this version is missing.
-fn tool(workspace: &Workspace, name: &str, version: &str) -> Result<Command> {
+/// Returns a program, which Cargo installs with these features below the target folder if this version is missing.
+pub(crate) fn tool(workspace: &Workspace, name: &str, version: &str, features: &str) -> Result<Command> {
     let root = workspace.target.join("tools");
     let installed = fs::read_to_string(root.join(".crates.toml")).unwrap_or_default();
     if !installed.contains(&format!("\"{name} {version} ")) {
         let mut command = workspace.cargo();
         // Without optimisation, which would take longer than it saves.
-        command.args(["install", name, "--version", &format!("={version}"), "--locked", "--debug", "--root"]);
-        shell::run(command.arg(&root))
+        command.args(["install", name, "--version", &format!("={version}"), "--features", features, "--locked"]);
+        shell::run(command.args(["--debug", "--root"]).arg(&root))
             .map_err(|error| skipped(format!("{name} {version} cannot be installed: {error}")))?;
     }
     let mut command = Command::new(root.join("bin").join(name));
@@ -67,20 +64,25 @@ fn tool(workspace: &Workspace, name: &str, version: &str) -> Result<Command> {
     Ok(command)
 }
 
-/// Packages every crate and builds it from its package.
+/// Returns the folder in which Cargo unpacks crates of registries.
+pub(crate) fn sources() -> PathBuf {
+    let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home = home.or_else(|| std::env::home_dir().map(|home| home.join(".cargo"))).unwrap_or_default();
+    home.join("registry/src")
+}
+
+/// Packages every crate that is published, in target/package, and builds it from its package.
 ///
 /// Removes packages that an earlier run has unpacked and built, because Cargo would reuse them for the same version.
 pub(crate) fn publish(workspace: &Workspace) -> Result<()> {
-    let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
-    let home = home.or_else(|| std::env::home_dir().map(|home| home.join(".cargo"))).unwrap_or_default();
-    for registry in fs::read_dir(home.join("registry/src")).into_iter().flatten().flatten() {
+    for registry in fs::read_dir(sources()).into_iter().flatten().flatten() {
         // The temporary registry of such a run has no host, so that its name begins with a dash.
         if registry.file_name().to_string_lossy().starts_with('-') {
             shell::remove(&registry.path())?;
         }
     }
-    let crates = workspace.root.join("crates");
-    let own = workspace.packages.iter().filter(|package| package.folder().starts_with(&crates));
-    shell::run(workspace.cargo().arg("clean").args(own.flat_map(|package| ["--package", &package.name])))?;
-    shell::run(workspace.cargo().args(["publish", "--workspace", "--dry-run", "--allow-dirty"]))
+    let published = workspace.packages.iter().filter(|package| package.is_published());
+    let names: Vec<&str> = published.flat_map(|package| ["--package", &package.name]).collect();
+    shell::run(workspace.cargo().arg("clean").args(&names))?;
+    shell::run(workspace.cargo().args(["package", "--locked", "--allow-dirty"]).args(&names))
 }

@@ -17,6 +17,9 @@ pub(crate) const HEAVY_CRATES: [&str; 2] = ["papsynth-python", "papsynth-zarr"];
 /// Features with dependencies that take long to build.
 pub(crate) const HEAVY_FEATURES: [&str; 3] = ["cloud", "parquet", "zarr"];
 
+/// The package of the program `papsynth`.
+pub(crate) const PROGRAM: &str = "papsynth-cli";
+
 /// The workspace.
 #[derive(Deserialize)]
 pub(crate) struct Workspace {
@@ -37,10 +40,16 @@ pub(crate) struct Workspace {
 #[derive(Deserialize)]
 pub(crate) struct Package {
     pub(crate) name: String,
+    pub(crate) version: String,
+    /// The oldest Rust that compiles it.
+    pub(crate) rust_version: String,
+    pub(crate) repository: Option<String>,
     /// Package ID.
     pub(crate) id: String,
     features: BTreeMap<String, IgnoredAny>,
     manifest_path: PathBuf,
+    /// The registries that it may be published to; `None` for all.
+    publish: Option<Vec<String>>,
     dependencies: Vec<Dependency>,
     /// Its targets.
     pub(crate) targets: Vec<Target>,
@@ -62,6 +71,12 @@ pub(crate) struct Target {
 }
 
 impl Workspace {
+    /// Returns the package of the released program.
+    pub(crate) fn released(&self) -> Result<&Package> {
+        let found = self.packages.iter().find(|package| package.name == PROGRAM);
+        found.with_context(|| format!("the workspace has no package {PROGRAM}"))
+    }
+
     /// Runs `cargo metadata`.
     pub(crate) fn load() -> Result<Self> {
         let text = shell::output(cargo_command().args(["metadata", "--no-deps", "--format-version", "1"]))?;
@@ -121,6 +136,10 @@ impl Workspace {
 impl Package {
     pub(crate) fn folder(&self) -> &Path {
         self.manifest_path.parent().unwrap_or(&self.manifest_path)
+    }
+
+    pub(crate) fn is_published(&self) -> bool {
+        self.publish.is_none()
     }
 
     /// Returns the members that it depends on.

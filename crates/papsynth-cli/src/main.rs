@@ -13,6 +13,8 @@ mod inspect;
 mod judge;
 #[cfg(feature = "learn")]
 mod learn;
+#[cfg(feature = "completions")]
+mod man;
 #[cfg(feature = "judge")]
 mod match_fields;
 mod memory;
@@ -109,10 +111,12 @@ fn run(verb: Verb) -> Result<(), ExitError> {
             clap_complete::generate(args.shell, &mut command, "papsynth", &mut script);
             exit::print(&String::from_utf8_lossy(&script))
         }
+        #[cfg(feature = "completions")]
+        Verb::Man(args) => man::run(&args),
         #[cfg(not(feature = "calibrate"))]
         Verb::Calibrate(_) => Err(ExitError::missing_feature("calibrate")),
         #[cfg(not(feature = "completions"))]
-        Verb::Completions(_) => Err(ExitError::missing_feature("completions")),
+        Verb::Completions(_) | Verb::Man(_) => Err(ExitError::missing_feature("completions")),
         #[cfg(not(feature = "judge"))]
         Verb::Judge(_) | Verb::Match(_) => Err(ExitError::missing_feature("judge")),
         #[cfg(not(feature = "learn"))]

@@ -115,7 +115,7 @@ impl<'a> OutputFile<'a> {
 }
 
 /// Checks that files can be written to the folder `out`, each replacing at most an older file of its kind.
-#[cfg(any(feature = "calibrate", feature = "judge"))]
+#[cfg(any(feature = "calibrate", feature = "completions", feature = "judge"))]
 pub(crate) fn check_folder(out: &Path, files: &[(&str, Kind)]) -> Result<(), ExitError> {
     if out.exists() && !out.is_dir() {
         return Err(ExitError::input(format!("--out {}: is a file; expected a folder", out.display())));

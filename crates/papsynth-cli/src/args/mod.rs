@@ -27,8 +27,6 @@ use crate::exit::{ExitError, escaped};
 
 #[cfg(not(feature = "calibrate"))]
 use MissingFeature as Calibrate;
-#[cfg(not(feature = "completions"))]
-use MissingFeature as Completions;
 #[cfg(not(feature = "learn"))]
 use MissingFeature as Learn;
 #[cfg(feature = "calibrate")]
@@ -45,6 +43,8 @@ pub(crate) use slide::{Slide, SlideTile, SlideVerb};
 pub(crate) use slide::{SlideFinalize, SlideMake};
 #[cfg(feature = "web")]
 pub(crate) use web::{Study, View, Workbench};
+#[cfg(not(feature = "completions"))]
+use {MissingFeature as Completions, MissingFeature as Man};
 #[cfg(not(feature = "judge"))]
 use {MissingFeature as Judge, MissingFeature as Match};
 #[cfg(not(feature = "web"))]
@@ -103,6 +103,7 @@ pub(crate) enum Verb {
     Workbench(Box<Workbench>),
     Schema(SchemaArgs),
     Completions(Completions),
+    Man(Man),
 }
 
 /// Print a commented recipe to edit.
@@ -143,6 +144,19 @@ pub(crate) struct Completions {
     /// Shell
     #[arg(value_enum)]
     pub(crate) shell: clap_complete::Shell,
+}
+
+/// Write manual pages of papsynth and of every subcommand.
+#[cfg(feature = "completions")]
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  papsynth man --out ~/.local/share/man/man1      then: man papsynth-generate
+  papsynth man --out pages                        then: man pages/papsynth-generate.1")]
+pub(crate) struct Man {
+    /// Folder for the pages, which replace older ones
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) out: PathBuf,
 }
 
 // The arguments of a subcommand without its feature. The doc comment is its help.

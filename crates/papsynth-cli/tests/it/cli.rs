@@ -175,7 +175,7 @@ fn wrong_usage_has_exit_code_2() {
 fn help_version_schema_and_completions_are_printed() {
     let bench = Bench::new("help");
     assert!(bench.good("--version").out.starts_with("papsynth "));
-    for verb in ["init", "generate", "preview", "learn", "inspect", "schema", "completions"] {
+    for verb in ["init", "generate", "preview", "learn", "inspect", "schema", "completions", "man"] {
         assert!(bench.good(&format!("{verb} --help")).out.contains("Example"), "{verb}");
     }
     let schema: serde_json::Value = serde_json::from_str(&bench.good("schema").out).unwrap();
@@ -183,6 +183,24 @@ fn help_version_schema_and_completions_are_printed() {
     for shell in ["bash", "zsh", "fish"] {
         assert!(bench.good(&format!("completions {shell}")).out.contains("papsynth"));
     }
+}
+
+#[cfg(feature = "completions")]
+#[test]
+fn every_subcommand_has_a_manual_page() {
+    let bench = Bench::new("man");
+    bench.good("man --out pages");
+    let page = |name: &str| fs::read_to_string(bench.path("pages").join(name)).unwrap();
+    for name in ["papsynth.1", "papsynth-generate.1", "papsynth-slide-make.1"] {
+        let (page, title) = (page(name), name.trim_end_matches(".1"));
+        assert!(page.contains(&format!(".TH {title} 1")), "{page}");
+        assert!(page.contains(".SH EXAMPLE") && !page.contains(".SH EXTRA"), "{page}");
+    }
+    bench.good("man --out pages");
+    fs::write(bench.path("pages/papsynth-init.1"), "mine").unwrap();
+    let again = bench.run("man --out pages");
+    assert!(again.code == 2 && again.err.contains("papsynth-init.1"), "{}", again.err);
+    assert_eq!(page("papsynth-init.1"), "mine");
 }
 
 #[test]

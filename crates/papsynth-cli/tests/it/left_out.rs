@@ -8,6 +8,7 @@ fn a_subcommand_without_its_feature_names_the_feature() {
     for (words, feature, is_here) in [
         ("calibrate --stack planes --step-um 0.5", "calibrate", cfg!(feature = "calibrate")),
         ("completions bash", "completions", cfg!(feature = "completions")),
+        ("man --out pages", "completions", cfg!(feature = "completions")),
         ("judge real synthetic --out report --help", "judge", cfg!(feature = "judge")),
         ("match real --out mine.toml", "judge", cfg!(feature = "judge")),
         ("learn --class parabasal --out mine.json", "learn", cfg!(feature = "learn")),
