@@ -35,6 +35,6 @@ fn add_pages(command: &Command, pages: &mut Vec<(String, String)>) -> Result<(),
     // clap_mangen calls the text after the options EXTRA; ours contains examples.
     let text = String::from_utf8_lossy(&text).replace(".SH EXTRA\nExamples:\n", ".SH EXAMPLES\n");
     pages.push((page.get_filename(), text.replace(".SH EXTRA\nExample:\n", ".SH EXAMPLE\n")));
-    let shown = command.get_subcommands().filter(|command| !command.is_hide_set());
-    shown.map(|command| add_pages(command, pages)).collect()
+    let mut shown = command.get_subcommands().filter(|command| !command.is_hide_set());
+    shown.try_for_each(|command| add_pages(command, pages))
 }
