@@ -166,7 +166,7 @@ fn invalid_input_of_a_judge_is_rejected_and_no_file_is_written() {
     for (words, wanted) in [
         ("judge good empty --pixel-um 0.3", "empty: contains no PNG, JPEG or TIFF file"),
         ("judge good missing --pixel-um 0.3", "missing: there is no such folder"),
-        ("judge good/images/000000.png good", "000000.png: is not a folder; expected a folder of images"),
+        ("judge broken/b.png good", "b.png: is not a folder; expected a folder of images"),
         ("judge good good", "neither folder records its pixel size"),
         ("judge few good --pixel-um 0.3", "few: 1 field; expected at least 2"),
         ("judge good flat --pixel-um 0.3", "is constant"),
