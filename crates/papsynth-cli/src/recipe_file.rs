@@ -157,12 +157,13 @@ impl Sources {
         // The user does not see this text, so only the paths of the fields are kept.
         let mut recipe = diagnose::read(&text)
             .map_err(|faults| faults.into_iter().map(|f| FieldError { span: None, ..f }).collect::<Vec<_>>())?;
-        if !self.sets.iter().any(|set| set.key == "conditions") {
-            recipe.clear_conditions(|path| {
-                let path: Vec<String> = path.split('.').map(str::to_owned).collect();
-                self.sets.iter().any(|set| set.replaces(&path))
-            });
-        }
+        // Conditions hold over the fields that are set before them.
+        let conditions = self.sets.iter().rposition(|set| set.key == "conditions");
+        let later = &self.sets[conditions.map_or(0, |place| place + 1)..];
+        recipe.clear_conditions(|path| {
+            let path: Vec<String> = path.split('.').map(str::to_owned).collect();
+            later.iter().any(|set| set.replaces(&path))
+        });
         Ok(recipe)
     }
 
@@ -329,6 +330,9 @@ mod tests {
             recipe.with_condition(0).debris.leukocytes.clusters.to_string(),
             "{ per_mm2 = { uniform = [10.0, 20.0] } }"
         );
+        // Conditions that are set later are kept.
+        let recipe = load(Preset::ExtendedFocus, &["stain.field_nucleus=1", conditions]).unwrap();
+        assert_eq!(recipe.conditions[0].numbers["stain.field_nucleus"].to_string(), "2");
     }
 
     #[test]

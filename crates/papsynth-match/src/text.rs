@@ -79,7 +79,9 @@ impl Fit {
                 lines.push_str(&format!("{name} = {}\n", toml_value(value)));
             }
         }
-        if !lines.is_empty() || other_kind {
+        // Without its header, an empty table would be read as the default.
+        let empty = fields.is_empty() && value != default;
+        if !lines.is_empty() || other_kind || empty {
             if !path.is_empty() {
                 out.push_str(&format!("\n[{path}]\n"));
             }
