@@ -133,7 +133,9 @@ const quoted = (word) => (/^[A-Za-z0-9_.=\/-]+$/.test(word) ? word : `'${word.re
 function settings() {
   const isStack = state.recipe.focus.planes !== 1;
   const recipe = focus === null || isStack ? state.recipe : replaced(state.recipe, ["focus", "centre_um"], focus);
-  return differences(state.base, recipe);
+  // Conditions are last: they hold over the fields set before them.
+  const isLast = ([path]) => path[0] === "conditions";
+  return differences(state.base, recipe).sort((a, b) => isLast(a) - isLast(b));
 }
 
 /** Returns a command for the field, with further options. */
