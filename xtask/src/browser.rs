@@ -29,7 +29,7 @@ pub(crate) fn run(workspace: &Workspace) -> Result<()> {
     let generate = |out: &Path, more: &[&str]| dataset::generate(Command::new(&program), out, small.iter().chain(more));
     generate(&synthetic, &[])?;
     // Images of another preset, without ground truth, replace real images.
-    generate(&other, &["--preset", "high-grade", "--seed", "1"])?;
+    generate(&other, &["--preset", "high-grade", "--seed", "2"])?;
     copy_images(&other.join("images"), &real)?;
     let stack = folder.join("stack");
     generate(&stack, &["--set", "focus.planes=5", "--set", "focus.step_um=1.5"])?;

@@ -193,6 +193,10 @@ mod tests {
             let text = fit.to_toml();
             let read: Recipe = toml::from_str(&text).unwrap_or_else(|e| panic!("{preset:?}: {e}\n{text}"));
             assert_eq!(read, fit.recipe, "{preset:?}\n{text}");
+            // Parameters of cells have no line in a recipe without cells.
+            if fit.recipe.cells.is_empty() {
+                continue;
+            }
             for answer in fit.parameters.iter().filter(|a| a.origin == Origin::Simulated) {
                 assert!(text.contains(&answer.note()), "{preset:?}: {}\n{text}", answer.note());
             }
