@@ -54,9 +54,9 @@ pub(crate) fn tool(workspace: &Workspace, name: &str, version: &str, features: &
     let installed = fs::read_to_string(root.join(".crates.toml")).unwrap_or_default();
     if !installed.contains(&format!("\"{name} {version} ")) {
         let mut command = workspace.cargo();
-        // Without optimisation, which would take longer than it saves.
+        // With little optimisation: more would take longer than it saves.
         command.args(["install", name, "--version", &format!("={version}"), "--features", features, "--locked"]);
-        shell::run(command.args(["--debug", "--root"]).arg(&root))
+        shell::run(command.args(["--debug", "--root"]).arg(&root).env("CARGO_PROFILE_DEV_OPT_LEVEL", "1"))
             .map_err(|error| skipped(format!("{name} {version} cannot be installed: {error}")))?;
     }
     let mut command = Command::new(root.join("bin").join(name));

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 
 use crate::package;
 use crate::shell;
@@ -34,8 +34,15 @@ pub(super) fn write(workspace: &Workspace) -> Result<()> {
     Ok(())
 }
 
+/// Returns the file of licences for the package in this folder, if [`write`] has made it.
+pub(super) fn found(workspace: &Workspace, folder: &str) -> Result<PathBuf> {
+    let texts = written(workspace, folder);
+    ensure!(texts.exists(), "there are no licences: run the step `licences` first");
+    Ok(texts)
+}
+
 /// Returns the file that [`write`] makes for the package in this folder.
-pub(super) fn written(workspace: &Workspace, folder: &str) -> PathBuf {
+fn written(workspace: &Workspace, folder: &str) -> PathBuf {
     super::work(workspace, &format!("licences-{}.txt", folder.trim_start_matches("crates/")))
 }
 

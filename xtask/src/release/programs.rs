@@ -22,13 +22,14 @@ const COMPLETIONS: [(&str, &str); 3] = [("bash", "papsynth.bash"), ("fish", "pap
 
 /// Builds the programs with all formats and stores, and an archive for each.
 pub(super) fn build(workspace: &Workspace) -> Result<()> {
+    let texts = licences::found(workspace, &format!("crates/{PROGRAM}"))?;
     for target in TARGETS {
         shell::need_target(target)?;
         let mut cargo = package::builder(workspace, "cargo-zigbuild")?;
         cargo.args(["zigbuild", "--locked", "--release", "--package", PROGRAM, "--all-features", "--target", target]);
         shell::run(cargo.env("RUSTFLAGS", without_paths()).current_dir(&workspace.root))?;
         ensure_static(&program(workspace, target))?;
-        archive(workspace, target)?;
+        archive(workspace, target, &texts)?;
     }
     Ok(())
 }
@@ -61,8 +62,8 @@ fn ensure_static(program: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Packs a program with licences, manual pages and completions. The same commit gives the same bytes.
-fn archive(workspace: &Workspace, target: &str) -> Result<()> {
+/// Packs a program with `texts` of licences, manual pages and completions. The same commit gives the same bytes.
+fn archive(workspace: &Workspace, target: &str, texts: &Path) -> Result<()> {
     let name = archive_name(&workspace.released()?.version, target);
     let folder = super::work(workspace, &name);
     shell::remove(&folder)?;
@@ -71,8 +72,7 @@ fn archive(workspace: &Workspace, target: &str) -> Result<()> {
     for file in OWN {
         shell::copy(&workspace.root.join(file), &folder.join(file))?;
     }
-    let texts = licences::written(workspace, &format!("crates/{PROGRAM}"));
-    shell::copy(&texts, &folder.join(licences::NAME))?;
+    shell::copy(texts, &folder.join(licences::NAME))?;
     // All programs have the same command line; this machine runs the first.
     let papsynth = || Command::new(program(workspace, TARGETS[0]));
     for (language, file) in COMPLETIONS {

@@ -27,7 +27,7 @@ const STORES: &str = "numpy\nboto3\nmoto[server]\n";
 pub(super) fn build(workspace: &Workspace) -> Result<()> {
     let folder = workspace.root.join(package::PACKAGE);
     let texts = folder.join(licences::NAME);
-    shell::copy(&licences::written(workspace, package::PACKAGE), &texts)?;
+    shell::copy(&licences::found(workspace, package::PACKAGE)?, &texts)?;
     shell::remove(&files(workspace))?;
     shell::make(&files(workspace))?;
     let built = PROCESSORS.into_iter().try_for_each(|processor| build_wheel(workspace, processor));
