@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail};
 use serde_json::{Map, Value, json};
 
 use crate::Input;
@@ -64,7 +64,7 @@ fn field(words: &[String]) -> Result<Field<'_>> {
             "--set" | "--with" | "--camera" => field.recipe.extend([word, value]),
             "--seed" => field.seed = value,
             "--range" => field.index = value.split("..").next().unwrap_or_default(),
-            "--model" => ensure!(false, "the workbench has no models: {value}"),
+            "--model" => bail!("the workbench has no models: {value}"),
             _ => (),
         }
     }
