@@ -492,10 +492,11 @@ impl Search<'_> {
         let values: Vec<Values> = draws.iter().map(|(places, field)| self.values(places, *field)).collect();
         let made = simulator.simulate(&values, first, phase)?;
         let round = self.rows.rounds.last().map_or(0, |round| round + 1);
-        for ((places, _), summary) in draws.into_iter().zip(made) {
+        for ((places, field), summary) in draws.into_iter().zip(made) {
             if let Some(summary) = summary {
                 self.rows.statistics.push(summary.values);
                 self.rows.places.push(places);
+                self.rows.fields.push(field);
                 self.rows.rounds.push(round);
             }
         }

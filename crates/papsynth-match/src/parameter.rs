@@ -148,6 +148,8 @@ parameters! {
     ClusterRadius: Simulated, All, Logarithmic 8.0..80.0 "um", "layout.radius_um";
     /// Weight of positions outside clusters.
     Outside: Simulated, All, Logarithmic 0.01..1.0 "", "layout.outside";
+    /// Granular material at the rim of cells.
+    Degeneration: Simulated, Field, Logarithmic 0.03..1.5 "", "cytoplasm.degeneration";
     /// Clusters of leukocytes.
     Leukocytes: Simulated, Field, Logarithmic 3.0..400.0 "/mm2", "debris.leukocytes.clusters";
     /// Clusters of bacilli.

@@ -3,8 +3,9 @@
 //! The statistics of a field are a quadratic function of its parameters, fitted to simulated samples by ridge
 //! regression, with normal errors. The parameters of fields are normal around their mean, with standard deviations
 //! between fields from an EM algorithm. The mean is that of the largest posterior density, by damped Gauss–Newton
-//! steps. Samples that are simulated around the result correct the function where it matters: indirect inference
-//! (Gourieroux, Monfort and Renault, doi:10.1002/jae.3950080507).
+//! steps, and so are the parameters of each field. Samples that are simulated around the result correct the function
+//! where it matters, for all fields together and for each field: indirect inference (Gourieroux, Monfort and Renault,
+//! doi:10.1002/jae.3950080507).
 
 use nalgebra::{DMatrix, DVector};
 use papsynth_judge::Phase;
@@ -25,11 +26,13 @@ pub struct Estimate {
     pub high: f64,
 }
 
-/// Simulated samples: statistics, positions of the parameters in their ranges, and rounds.
+/// Simulated samples: statistics, positions of the parameters in their ranges, fields and rounds.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Rows {
     pub(crate) statistics: Vec<Vec<f64>>,
     pub(crate) places: Vec<Vec<f64>>,
+    /// The field around whose parameters each sample was drawn; none for the samples from the complete ranges.
+    pub(crate) fields: Vec<Option<usize>>,
     /// The round of each sample; 0 for the samples from the complete ranges.
     pub(crate) rounds: Vec<i32>,
 }
@@ -88,6 +91,9 @@ pub(crate) struct Response {
     /// Mean difference of the latest samples from the function, and the number of these samples.
     offset: DVector<f64>,
     latest: f64,
+    /// Further mean difference of the samples around each field, and the variances of the errors of these means.
+    of_fields: Vec<DVector<f64>>,
+    unsure: DVector<f64>,
 }
 
 /// Returns positions relative to the centres of their ranges, and their centred squares.
@@ -143,21 +149,51 @@ impl Response {
             covariance[(c, c)] = diagonal[c] + 1e-6;
         }
         let near = rows.weights(OLDER_MEAN);
-        let offset = if rows.rounds.last() == Some(&0) {
-            DVector::zeros(count)
-        } else {
-            let function =
-                |i: usize, c: usize| factors[(c, 0)] + (0..width).map(|j| factors[(c, j + 1)] * raw[i][j]).sum::<f64>();
-            DVector::from_fn(count, |c, _| weighted_mean((0..n).map(|i| (scaled[i][c] - function(i, c), near[i]))))
+        let function =
+            |i: usize, c: usize| factors[(c, 0)] + (0..width).map(|j| factors[(c, j + 1)] * raw[i][j]).sum::<f64>();
+        let off: Vec<Vec<f64>> = (0..n).map(|i| (0..count).map(|c| scaled[i][c] - function(i, c)).collect()).collect();
+        let mean_of = |of: &dyn Fn(usize) -> bool| {
+            DVector::from_fn(count, |c, _| weighted_mean((0..n).filter(|i| of(*i)).map(|i| (off[i][c], near[i]))))
         };
-        let [sum, squares] = near.iter().fold([0.0; 2], |[s, q], w| [s + w, q + w * w]);
-        Ok(Self { scaler, factors, certain, errors: covariance, offset, latest: sum * sum / squares })
+        let number_of = |of: &dyn Fn(usize) -> bool| {
+            let [sum, squares] =
+                (0..n).filter(|i| of(*i)).fold([0.0; 2], |[s, q], i| [s + near[i], q + near[i] * near[i]]);
+            sum * sum / squares.max(1e-12)
+        };
+        let offset = if rows.rounds.last() == Some(&0) { DVector::zeros(count) } else { mean_of(&|_| true) };
+        let fields = rows.fields.iter().flatten().max().map_or(0, |last| last + 1);
+        let mut of_fields: Vec<DVector<f64>> =
+            (0..fields).map(|f| mean_of(&|i| rows.fields[i] == Some(f)) - &offset).collect();
+        let mut unsure = DVector::zeros(count);
+        let samples: Vec<f64> = (0..fields).map(|f| number_of(&|i| rows.fields[i] == Some(f)).max(1.0)).collect();
+        for c in 0..count {
+            // Differences as between samples of one field are chance.
+            let of_chance: Vec<f64> = samples.iter().map(|number| diagonal[c] / number).collect();
+            let excess = of_fields.iter().zip(&of_chance).map(|(own, chance)| own[c] * own[c] - chance);
+            let variance = (excess.sum::<f64>() / fields.max(1) as f64).max(0.0);
+            for (own, chance) in of_fields.iter_mut().zip(&of_chance) {
+                let kept = variance / (variance + chance).max(1e-12);
+                own[c] *= kept;
+                unsure[c] += kept * chance / fields as f64;
+            }
+        }
+        let latest = number_of(&|_| true);
+        Ok(Self { scaler, factors, certain, errors: covariance, offset, latest, of_fields, unsure })
     }
 
     /// Returns the statistics of a field.
     fn at(&self, places: &[f64]) -> DVector<f64> {
         let row = DVector::from_iterator(2 * places.len() + 1, std::iter::once(1.0).chain(features(places)));
         &self.factors * row + &self.offset
+    }
+
+    /// Returns the statistics near the parameters of a field, which are `apart` from the mean.
+    fn local(&self, field: usize, places: &[f64], apart: &DVector<f64>, varies: &[bool]) -> Local {
+        let moving: Vec<usize> = (0..varies.len()).filter(|c| varies[*c]).collect();
+        let slopes = slopes(&self.certain, places).select_columns(&moving);
+        let base = self.at(places) - &slopes * apart.select_rows(&moving);
+        let base = self.of_fields.get(field).map_or(base.clone(), |own| base + own);
+        Local { slopes, base }
     }
 
     /// Returns the parameters of fields from their statistics, each the mean of `samples` samples. The search
@@ -176,11 +212,12 @@ impl Response {
             let size = m.nrows();
             m.cholesky().map_or_else(|| DMatrix::identity(size, size), |c| c.inverse())
         };
-        let of_field = inverse(&self.errors / samples as f64);
+        let of_field = inverse(&self.errors / samples as f64 + DMatrix::from_diagonal(&self.unsure));
         let sampled = 1.0 / (count * samples) as f64 + 1.0 / self.latest;
 
         let mut means = start.means.clone();
-        let mut apart = vec![DVector::zeros(columns); count];
+        let mut apart: Vec<DVector<f64>> =
+            start.fields.iter().map(|f| DVector::from_fn(columns, |c, _| f[c] - means[c])).collect();
         let mut variances = DVector::zeros(columns);
         let mut unsure = DVector::zeros(columns);
         let mut covariance = DMatrix::identity(columns, columns);
@@ -188,9 +225,11 @@ impl Response {
         for _ in 0..STEPS {
             let all = slopes(&self.factors, &means);
             let certain = slopes(&self.certain, &means);
-            (apart, variances, unsure) = deviations(&certain, &of_field, &seen, &average, varies);
             let places = |a: &DVector<f64>| -> Vec<f64> { (0..columns).map(|c| place(means[c], a[c])).collect() };
-            let expected: DVector<f64> = apart.iter().map(|a| self.at(&places(a))).sum::<DVector<f64>>() / count as f64;
+            let local: Vec<Local> = (0..count).map(|f| self.local(f, &places(&apart[f]), &apart[f], varies)).collect();
+            (apart, variances, unsure) = deviations(&local, &of_field, &seen, &average, &apart, varies);
+            let expected: Vec<DVector<f64>> = (0..count).map(|f| self.at(&places(&apart[f]))).collect();
+            let expected: DVector<f64> = expected.iter().sum::<DVector<f64>>() / count as f64;
             let rest = &average - expected;
             let mut of_mean = &self.errors * sampled;
             for (c, r) in rest.iter().enumerate() {
@@ -229,30 +268,53 @@ fn slopes(factors: &DMatrix<f64>, places: &[f64]) -> DMatrix<f64> {
     })
 }
 
+/// The statistics near the parameters of a field.
+struct Local {
+    /// Derivatives by the parameters that differ between fields.
+    slopes: DMatrix<f64>,
+    /// The statistics there, minus those that the derivatives explain.
+    base: DVector<f64>,
+}
+
 /// Returns the differences of the parameters of each field from their mean, their variances between fields, and the
-/// variances of the errors of the differences.
+/// variances of the errors of the differences. `before` are the differences where the statistics are known.
 fn deviations(
-    slopes: &DMatrix<f64>,
+    local: &[Local],
     weight: &DMatrix<f64>,
     seen: &[DVector<f64>],
     average: &DVector<f64>,
+    before: &[DVector<f64>],
     varies: &[bool],
 ) -> (Vec<DVector<f64>>, DVector<f64>, DVector<f64>) {
     let columns = varies.len();
     let moving: Vec<usize> = (0..columns).filter(|c| varies[*c]).collect();
-    let slopes = slopes.select_columns(&moving);
-    let back = slopes.transpose() * weight;
-    let information = &back * &slopes;
-    let pulls: Vec<DVector<f64>> = seen.iter().map(|s| &back * (s - average)).collect();
+    // What no field can match does not matter.
+    let base: DVector<f64> = local.iter().map(|l| &l.base).sum::<DVector<f64>>() / local.len() as f64;
+    let parts: Vec<(DMatrix<f64>, DVector<f64>)> = local
+        .iter()
+        .zip(seen)
+        .map(|(l, seen)| {
+            let back = l.slopes.transpose() * weight;
+            (&back * &l.slopes, back * (seen - average - (&l.base - &base)))
+        })
+        .collect();
     let mut variances = DVector::from_element(moving.len(), PRIOR_SPREAD * PRIOR_SPREAD);
     let mut apart = Vec::new();
     let mut unsure = variances.clone();
     let freedom = seen.len().saturating_sub(1) as f64;
     for _ in 0..EM_STEPS {
         let prior = DMatrix::from_diagonal(&variances.map(|v: f64| 1.0 / v.max(1e-9)));
-        let Some(covariance) = (&information + prior).cholesky().map(|c| c.inverse()) else { break };
-        unsure = covariance.diagonal();
-        apart = pulls.iter().map(|p| &covariance * p).collect::<Vec<DVector<f64>>>();
+        let solved: Option<Vec<(DVector<f64>, DVector<f64>)>> = parts
+            .iter()
+            .map(|(information, pull)| {
+                let covariance = (information + &prior).cholesky()?.inverse();
+                Some((&covariance * pull, covariance.diagonal()))
+            })
+            .collect();
+        let Some(solved) = solved else { break };
+        unsure = solved.iter().map(|(_, unsure)| unsure).sum::<DVector<f64>>() / seen.len() as f64;
+        let mean: DVector<f64> = solved.iter().map(|(a, _)| a).sum::<DVector<f64>>() / seen.len() as f64;
+        apart = solved.into_iter().map(|(a, _)| a - &mean).collect::<Vec<DVector<f64>>>();
         if seen.len() < 2 {
             break;
         }
@@ -266,7 +328,10 @@ fn deviations(
         moving.iter().zip(of.iter()).for_each(|(c, v)| all[*c] = *v);
         all
     };
-    (apart.iter().map(wide).collect(), wide(&variances), wide(&unsure))
+    let stepped = |a: &DVector<f64>, before: &DVector<f64>| {
+        wide(a).zip_map(before, |to, from| from + (to - from).clamp(-LARGEST_STEP, LARGEST_STEP))
+    };
+    (apart.iter().zip(before).map(|(a, b)| stepped(a, b)).collect(), wide(&variances), wide(&unsure))
 }
 
 /// What is known of the parameters before any field is seen.
@@ -369,6 +434,7 @@ mod tests {
                 })
                 .collect();
             rounds.statistics.push(statistics(&places, 0.1, rng));
+            rounds.fields.push(around.map(|found| i % found.fields.len()));
             rounds.places.push(places);
             rounds.rounds.push(round);
         }

@@ -41,6 +41,7 @@ impl Setting {
             P::NoiseCorrelationX | P::NoiseCorrelationY => self.extended,
             P::Pixel => self.seek_pixel,
             P::Size => !self.seek_pixel,
+            P::Degeneration => centre(&self.base.cytoplasm.degeneration) > 0.0,
             P::Outside | P::ClusterRadius => matches!(self.base.layout, Layout::Clusters(_)),
             P::Superficial => PAIR.iter().all(|class| self.base.cells.contains_key(*class)),
             P::Lesion => {
@@ -110,6 +111,7 @@ impl Setting {
             (P::Size, of_first(base, P::Size)),
             (P::SizeVariation, of_first(base, P::SizeVariation)),
             (P::NucleusSize, of_first(base, P::NucleusSize)),
+            (P::Degeneration, centre(&base.cytoplasm.degeneration)),
             (P::ClusterRadius, radius),
             (P::Outside, outside),
             (P::Leukocytes, density(&debris.leukocytes.clusters, area)),
@@ -204,6 +206,7 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
         (P::NoiseCorrelationY, &mut r.focus.noise_correlation_y, |value, _| number(value.clamp(0.0, 0.5))),
         (P::Depth, &mut r.slide.depth_um, |value, _| number(value)),
         (P::CellEdge, &mut r.cytoplasm.rim_um, |value, like| cut(about(value, like), 0.0, 10.0)),
+        (P::Degeneration, &mut r.cytoplasm.degeneration, |value, like| cut(about(value, like), 0.0, 5.0)),
         (P::CytoplasmVariation, &mut r.stain.cytoplasm_variation, |value, _| number(value)),
         (P::NucleusVariation, &mut r.stain.nucleus_variation, |value, _| number(value)),
         (P::Dome, &mut r.nucleus.dome, |value, _| within(value, 0.2)),

@@ -275,6 +275,9 @@ section! {
         folds: Folds (undrawn);
         /// Angularity of the outline: 0 is smooth, 1 a polygon.
         angularity: Number (given f64) = Number::uniform(0.10, 0.60), 0..=1;
+        /// Length of a cell relative to its width, in addition to the shape of its class: the cell is stretched along
+        /// its long axis and keeps its area.
+        elongation: Number (given f64) = 1.0, 0.2..=5;
         /// Number of notches of the rim.
         notches: Number (given usize) = Number::log_normal(2.5, 0.9).at_most(14.0), 0..=20;
         /// Number of protrusions of the rim.
@@ -310,6 +313,9 @@ section! {
         /// Number of granules of a granular cell per 100 µm².
         granules: Number
             (given f64 as granules: "Number of granules per 100 µm², 0 if the cell is not granular.") = Number::log_normal(12.0, 0.6), 0..=1000;
+        /// Degeneration: dark granular material at the rim and in patches, and a frayed rim; above 1, the material covers
+        /// the cell. The number is the absorbance of the material relative to the cytoplasm.
+        degeneration: Number (given f64) = 0.0, 0..=5;
         /// Amplitude of the irregularity of the outline.
         fray_um: Number = Number::log_normal(0.65, 0.45), 0..=5, "µm";
         /// Width of the marginal zone in which the sheet becomes thinner.

@@ -39,8 +39,19 @@ impl CellBody {
     pub(crate) fn reach_um(&self) -> f64 {
         /// In radii. About one cell of the default model in a thousand exceeds 1.75.
         const REACH: f64 = 1.9;
-        REACH * self.radius_um
+        let elongation = self.detail.elongation;
+        REACH * self.radius_um * elongation.max(1.0 / elongation).sqrt()
     }
+}
+
+/// Stretches a displacement along an axis, and shortens it across, so that areas stay the same.
+pub(crate) fn stretched([x, y]: [f64; 2], elongation: f64, axis_rad: f64) -> [f64; 2] {
+    if elongation == 1.0 {
+        return [x, y];
+    }
+    let (sin, cos, factor) = (libm::sin(axis_rad), libm::cos(axis_rad), elongation.sqrt());
+    let [along, across] = [factor * (x * cos + y * sin), (y * cos - x * sin) / factor];
+    [along * cos - across * sin, along * sin + across * cos]
 }
 
 /// The cleared space around the nucleus of a koilocyte.

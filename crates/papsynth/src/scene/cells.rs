@@ -11,7 +11,7 @@ use crate::random;
 use crate::recipe::section::named;
 use crate::recipe::{CellMix, GroupForm, Number, Recipe};
 
-use super::cell::{CellBody, CellDetail, Fold, FoldForm, Halo, NucleusBody};
+use super::cell::{CellBody, CellDetail, Fold, FoldForm, Halo, NucleusBody, stretched};
 use super::depth::Relief;
 use super::field::{ClassCount, Object};
 use super::groups::{Groups, Place};
@@ -156,7 +156,8 @@ impl Drawn {
     pub(super) fn placed(self, kind: Class<'_>, number: u64, place: &Place, depth_um: f64) -> Object {
         let Self { mut body, any_deg, stacking_um } = self;
         let rotation_deg = if place.group == 0 { any_deg } else { place.rotation_deg };
-        body.nucleus.off_centre = polar(body.nucleus.off_centre, kind.class.nucleus.polarity, rotation_deg);
+        let off_centre = polar(body.nucleus.off_centre, kind.class.nucleus.polarity, rotation_deg);
+        body.nucleus.off_centre = stretched(off_centre, body.detail.elongation, rotation_deg.to_radians());
         Object {
             id: 0,
             number,
@@ -219,8 +220,9 @@ fn draw_body(
     detail.texture *= strength.median * libm::exp(stain.texture_variation * deviation) / thickness.sqrt();
     let fold = draw_fold(recipe, cytoplasm.pliability, rng);
     let distance = (nucleus.off_centre.mean + nucleus.off_centre.sd * random::normal(rng)).clamp(0.0, 1.0);
-    // The nucleus stays inside the cell.
-    let distance = distance.min((0.85 - nucleus_um / radius_um).max(0.0));
+    // The nucleus stays inside the cell, which can be narrow.
+    let narrowness = detail.elongation.max(1.0 / detail.elongation).sqrt();
+    let distance = distance.min((0.85 - narrowness * nucleus_um / radius_um).max(0.0));
     let angle = random::direction(rng);
     let pyknotic = random::chance(recipe.nucleus.pyknotic.draw(rng), rng);
     let wrinkled = random::chance(recipe.nucleus.wrinkled.draw(rng), rng);
@@ -318,6 +320,8 @@ fn draw_detail(recipe: &Recipe, pliability: f64, rng: &mut Stream, own: &impl Fn
     CellDetail {
         excess_area,
         angularity: pliable(named!(recipe.cytoplasm.angularity)),
+        elongation: own(named!(recipe.cytoplasm.elongation)),
+        degeneration: own(named!(recipe.cytoplasm.degeneration)),
         notches: random::count(pliable(named!(recipe.cytoplasm.notches))),
         protrusions: random::count(pliable(named!(recipe.cytoplasm.protrusions))),
         wrinkles: random::count(pliable(named!(recipe.cytoplasm.wrinkles))),

@@ -3,7 +3,7 @@
 use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::Preset;
-use papsynth::truth::{Mask, Part};
+use papsynth::truth::{Mask, Part, Truth};
 use papsynth::{Engine, Inputs};
 
 /// Largest distance of an outline from a chord that counts as straight, in diameters of the cell.
@@ -77,4 +77,48 @@ fn no_cell_has_a_longer_straight_border_than_real_cells() {
         .map(|(t, side)| [[t, 0.0], [100.0, t], [100.0 - t, 100.0], [0.0, 100.0 - t]][side])
         .collect();
     assert!((straight_run(&square, 1.0) - 100.0).abs() < 4.0);
+}
+
+/// Returns the length of a mask over its width, from its second moments.
+fn length_over_width(mask: &Mask) -> f64 {
+    let points = || mask.runs().iter().flat_map(|run| (run.x0..run.x1).map(|x| [f64::from(x), f64::from(run.y)]));
+    let count = mask.area() as f64;
+    let mean = [0, 1].map(|axis| points().map(|p| p[axis]).sum::<f64>() / count);
+    let moment = |i: usize, j: usize| points().map(|p| (p[i] - mean[i]) * (p[j] - mean[j])).sum::<f64>() / count;
+    let [xx, yy, xy] = [moment(0, 0), moment(1, 1), moment(0, 1)];
+    let root = libm::hypot(0.5 * (xx - yy), xy);
+    ((0.5 * (xx + yy) + root) / (0.5 * (xx + yy) - root)).sqrt()
+}
+
+#[test]
+fn a_stretched_cell_keeps_its_area_and_holds_its_nucleus() {
+    const ELONGATION: f64 = 2.0;
+    let truth_of = |elongation: f64| {
+        let mut recipe = Preset::Lbc.recipe();
+        recipe.cytoplasm.elongation = elongation.into();
+        (recipe.cytoplasm.folds.flap, recipe.cytoplasm.folds.roll) = (0.into(), 0.into());
+        recipe.cytoplasm.folds.folded_over = 0.into();
+        let engine = Engine::new(&recipe, &Model::builtin(), &Inputs::default()).unwrap();
+        engine.frame(Key { seed: 7, index: 0 }).unwrap().finished.truth
+    };
+    let [round, long] = [1.0, ELONGATION].map(truth_of);
+    // Truncated cells can be absent from one of the images, so that cells have other identifiers.
+    let whole = |truth: &Truth, centre_um: [f64; 2], part: Part| {
+        let found = truth.objects.iter().find(|o| o.centre_um == centre_um && o.part == part && !o.truncated);
+        found.map(|o| o.amodal.clone())
+    };
+    let (mut ratios, mut outside, mut nuclei) = (Vec::new(), 0, 0);
+    for object in long.objects.iter().filter(|o| o.part == Part::Cytoplasm && !o.truncated) {
+        let Some(before) = whole(&round, object.centre_um, Part::Cytoplasm) else { continue };
+        let areas = [&before, &object.amodal].map(|mask| mask.area() as f64);
+        assert!((areas[1] / areas[0] - 1.0).abs() < 0.1, "cell {}: {areas:?}", object.id);
+        ratios.push(length_over_width(&object.amodal) / length_over_width(&before));
+        let nucleus = whole(&long, object.centre_um, Part::Nucleus).unwrap();
+        outside += Mask::union([&nucleus, &object.amodal]).area() - object.amodal.area();
+        nuclei += nucleus.area();
+    }
+    assert!(outside * 50 <= nuclei, "{outside} of {nuclei} pixels of nuclei are outside of their cells");
+    ratios.sort_by(f64::total_cmp);
+    let median = ratios[ratios.len() / 2];
+    assert!(ratios.len() > 10 && (0.8 * ELONGATION..1.2 * ELONGATION).contains(&median), "{ratios:?}");
 }

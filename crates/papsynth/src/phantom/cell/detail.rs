@@ -12,6 +12,7 @@ use crate::phantom::noise_fields::{FieldSampler, NoiseField, SIDE, Texels};
 use crate::phantom::parametric_shape::perturbed_circle;
 use crate::phantom::tile::{Point, Tile, scaled_about};
 use crate::random;
+use crate::scene::cell::CellDetail;
 
 /// Standard deviation of the absorbance profile of a granule, µm.
 const GRANULE_UM: f64 = 0.28;
@@ -140,6 +141,70 @@ pub(super) fn add_granules(absorbance: &mut Tile, coverage: &Tile, per_100_um2: 
                 *value += (peak * across) as f32;
             }
         }
+    }
+}
+
+/// Increase of the irregularity of the outline of a cell with its degeneration.
+const FRAYED: f64 = 1.5;
+
+/// Returns the amplitude of the irregularity of the outline, µm.
+pub(super) fn fray_um(detail: &CellDetail) -> f64 {
+    detail.fray_um * (1.0 + FRAYED * detail.degeneration)
+}
+
+/// Standard deviations of the smoothing of the noise fields of degenerated material, µm: two sizes of grains, clumps of
+/// grains, and patches.
+const MATERIAL_UM: [f64; 4] = [0.2, 0.5, 1.1, 3.0];
+
+/// Width of the zone at the rim with most of the material, µm.
+const MARGIN_UM: f64 = 6.0;
+
+/// The fraction of a place that is covered with material: inside, at the rim in addition, and by patches. Strongly
+/// degenerated cells are covered everywhere.
+const INSIDE: [f32; 2] = [-0.4, 0.9];
+const AT_RIM: f32 = 0.6;
+const OF_PATCHES: f32 = 0.4;
+
+/// Absorbance of the material relative to its strength: mean, and standard deviation of the grains of each size.
+const MATERIAL: f32 = 0.8;
+const GRAINS: f32 = 0.28;
+
+/// Adds the granular material of a degenerated cell.
+pub(super) fn add_degeneration(absorbance: &mut Tile, coverage: &Tile, cell: &CellContext<'_>) {
+    let strength = cell.body.detail.degeneration as f32;
+    if strength <= 0.0 {
+        return;
+    }
+    let (pixel_um, clouds, rng) = (cell.pixel_um(), cell.noise_fields.clouds(), &mut cell.stream("degeneration"));
+    let samplers = MATERIAL_UM.map(|um| FieldSampler::clouds((um / pixel_um).max(0.5), rng));
+    let radius = random::count(MARGIN_UM / pixel_um).max(1);
+    let side = (2 * radius + 1) as f32;
+    let width = coverage.width;
+    let mut texels: Texels = [0.0; SIDE + 1];
+    let mut fields = [(); MATERIAL_UM.len()].map(|()| vec![0.0_f32; width]);
+    let mut rows = absorbance.values.chunks_exact_mut(width).zip(coverage.values.chunks_exact(width)).enumerate();
+    for_each_row_of_sums(coverage, radius, |sums| {
+        let Some((y, (row, cover))) = rows.next() else { return };
+        let Some((first, end)) = covered(cover) else { return };
+        for (field, sampler) in fields.iter_mut().zip(&samplers) {
+            clouds.row_into(&mut field[first..end], sampler, [first as f64, y as f64], &mut texels);
+        }
+        let fields = fields.each_ref().map(|field| &field[first..end]);
+        encrust(&mut row[first..end], fields, &sums[first..end], 1.0 / (side * side), strength);
+    });
+}
+
+/// Adds material to a row.
+#[multiversion(targets = "simd")]
+fn encrust(row: &mut [f32], fields: [&[f32]; 4], sums: &[f32], weight: f32, strength: f32) {
+    let [fine, coarse, clumps, patches] = fields;
+    let inside = INSIDE[0] + INSIDE[1] * strength;
+    let grains = fine.iter().zip(coarse).zip(clumps).zip(patches);
+    for ((value, (((fine, coarse), clumps), patches)), sum) in row.iter_mut().zip(grains).zip(sums) {
+        let margin = 1.0 - (2.0 * weight * sum - 1.0).clamp(0.0, 1.0);
+        let covered = (inside + AT_RIM * margin + OF_PATCHES * patches).clamp(0.0, 1.0);
+        let grain = MATERIAL + GRAINS * (fine + coarse + clumps);
+        *value += strength * covered * if grain > 0.0 { grain } else { 0.0 };
     }
 }
 
@@ -453,6 +518,22 @@ mod tests {
             let error = (squares / like.values.len() as f64).sqrt();
             assert!(error < 0.02, "{sigma_px}: {error}");
         }
+    }
+
+    #[test]
+    fn degenerated_material_lies_at_the_rim_and_in_patches() {
+        let grains = [0.5_f32; 4];
+        // The mean coverage around: at a straight rim, half inside the margin, and twice inside.
+        let [sums, patches] = [[0.5, 0.75, 1.0, 1.0], [0.0, 0.0, 0.0, 2.0]];
+        let mut row = [0.2_f32; 4];
+        encrust(&mut row, [&grains, &grains, &grains, &patches], &sums, 1.0, 0.3);
+        assert!(row[0] > row[1] && row[1] > row[2] && row[2] == 0.2 && row[3] > 0.2, "{row:?}");
+        let mut row = [0.2_f32; 4];
+        encrust(&mut row, [&[-2.0; 4], &[-2.0; 4], &[-2.0; 4], &patches], &sums, 1.0, 0.3);
+        assert_eq!(row, [0.2; 4]);
+        // A strongly degenerated cell is covered everywhere.
+        encrust(&mut row, [&grains, &grains, &grains, &[0.0; 4]], &sums, 1.0, 1.0);
+        assert!(row.iter().all(|value| *value > 0.2), "{row:?}");
     }
 
     #[test]

@@ -17,7 +17,7 @@ use crate::phantom::nucleus;
 use crate::phantom::piece::{MIN_ABSORBANCE, Phantom, Piece};
 use crate::phantom::tile::{Point, Tile, area};
 use crate::profile::Stage;
-use crate::scene::cell::{CellBody, Fold, FoldForm, NucleusBody};
+use crate::scene::cell::{CellBody, Fold, FoldForm, NucleusBody, stretched};
 use crate::truth::part::Part;
 use crate::truth::traits::Trait;
 
@@ -64,11 +64,11 @@ fn outline(cell: &CellContext<'_>, class: &ClassAssets, centre: Point) -> Result
     let mut rng = cell.stream("outline");
     let radius_px = cell.body.radius_um / cell.pixel_um();
     let formed = class.cytoplasm(radius_px, &mut rng)?;
-    let rotated = formed.rotated(cell.object.rotation_deg.to_radians());
-    let outline = rotated.outline(POINTS);
+    let rotation = cell.object.rotation_deg.to_radians();
+    let outline = formed.rotated(rotation).outline(POINTS);
     let middle = fsd_shape::centroid(&outline);
-    let outline: Vec<Point> =
-        outline.iter().map(|p| [p[0] - middle[0] + centre[0], p[1] - middle[1] + centre[1]]).collect();
+    let about = |p: &Point| stretched([p[0] - middle[0], p[1] - middle[1]], cell.body.detail.elongation, rotation);
+    let outline: Vec<Point> = outline.iter().map(about).map(|[x, y]| [x + centre[0], y + centre[1]]).collect();
     Ok(outline::shaped(outline, &cell.body.detail, &mut cell.stream("outline.corners")))
 }
 
@@ -141,7 +141,7 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
         .iter()
         .map(|p| {
             let on_crease = |p: Point| plan.creases.iter().any(|crease| crease.distance_beyond(p) > 0.0);
-            outline::roughened(p, body.detail.fray_um / pixel_um, RIM_STEP_UM / pixel_um, on_crease, &mut rng)
+            outline::roughened(p, detail::fray_um(&body.detail) / pixel_um, RIM_STEP_UM / pixel_um, on_crease, &mut rng)
         })
         .collect();
     let mut coverage = Tile::around(rough.iter().flatten(), 3.0);
@@ -180,6 +180,7 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
     detail::add_detail(&mut absorbance, &coverage, inner, cell, &mut rng)?;
     let lines = &mut canvas[..coverage.values.len()];
     detail::add_cytoskeleton(&mut absorbance, &plan.outline, cell, lines, &mut rng)?;
+    detail::add_degeneration(&mut absorbance, &coverage, cell);
     detail::add_granules(&mut absorbance, &coverage, body.detail.granules, pixel_um, &mut rng);
     // Eq. 12: A = κ·c·l.
     let strength = body.cytoplasm_absorbance.max(MIN_ABSORBANCE) as f32;
