@@ -3,10 +3,11 @@
     nucleus_net.py --train SET [SET ...] --test FOLDER --out RESULT.json [--mask IMAGE MASK] [--steps N] [--seed N] [--weights FILE]
 
 A SET is a data set of `papsynth generate`, or a folder of data sets, of which the masks of nuclei are learned, or a folder of PNG and CSV files with
-the centres of nuclei (y, x), of which discs are learned. SET:N uses its first N fields. Each batch has equally many crops of all SETs. In data sets,
-a part of the crops show objects that look like nuclei, and their pixels count as much as those of nuclei. FOLDER holds real fields with centres and
-frames.csv with their grades. A nucleus is found if a detection lies within 12 pixels (4 µm). Writes the numbers of found, detected and annotated
-nuclei of every field, and the Dice coefficient of a mask at several scales, as JSON.
+the centres of nuclei (y, x), of which discs are learned. SET:N uses its first N fields. Each batch has equally many crops of all SETs; the last third
+of the steps uses the last SET alone, so that a network that learns from synthetic and real fields ends with real ones. In data sets, a part of the
+crops show objects that look like nuclei, and their pixels count as much as those of nuclei. FOLDER holds real fields with centres and frames.csv with
+their grades. A nucleus is found if a detection lies within 12 pixels (4 µm). Writes the numbers of found, detected and annotated nuclei of every
+field, and the Dice coefficient of a mask at several scales, as JSON.
 """
 
 import argparse
@@ -31,6 +32,7 @@ SMALLEST = 60  # area of a detection, pixels
 SCALES = (1.0, 0.94)  # of the image with a mask, whose pixel size is not known exactly
 CHANNELS = 12  # of the first level of the network
 CONTRAST = 4.0  # factor on the images
+LAST = 1 / 3  # part of the steps in which only the last set is used
 MIMICS = (4, 5)  # first and last semantic class of objects that look like nuclei: shreds and leukocytes
 MIMIC_CROPS = 0.35  # share of the crops that are chosen to show such objects
 NUCLEUS_WEIGHT = 3.0  # of pixels of nuclei, and of objects that look like them
@@ -131,7 +133,7 @@ def crop(fields, rng):
 
 
 def train(sets, steps, seed):
-    """Return the network after training on batches of which each set gives an equal part."""
+    """Return the network after training on batches of which each set gives an equal part; the last ones are of the last set."""
     rng = np.random.default_rng(seed)
     tf.keras.utils.set_random_seed(seed)
     net = network()
@@ -150,7 +152,8 @@ def train(sets, steps, seed):
 
     losses = []
     for number in range(steps):
-        crops = [crop(sets[k % len(sets)], rng) for k in range(BATCH)]
+        used = sets if number < steps * (1 - LAST) else sets[-1:]
+        crops = [crop(used[k % len(used)], rng) for k in range(BATCH)]
         images, targets, weights = (np.array(values, np.float32)[..., None] for values in zip(*crops))
         losses.append(float(step(images * CONTRAST, targets, weights)))
         if number % 100 == 99:

@@ -446,6 +446,7 @@ mod tests {
         const FIELDS: usize = 6;
         let varies = [true, true, false];
         let (mut covered, mut width, mut spread) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+        let mut off = [0.0; 2];
         for seed in 0..TRIALS {
             let rng = &mut Xoshiro256PlusPlus::seed_from_u64(seed);
             // Each other trial has fields that differ.
@@ -466,6 +467,9 @@ mod tests {
             }
             assert!(!found.is_visible(2) && found.spreads[2] == 0.0, "{:?}", found.errors);
             for c in 0..2 {
+                for (field, truth) in found.fields.iter().zip(&truth) {
+                    off[usize::from(apart > 0.0)] += (field[c] - truth[c]).abs() / (TRIALS * FIELDS as u64) as f64;
+                }
                 let e = found.mean(c);
                 let mean = truth.iter().map(|t| t[c]).sum::<f64>() / FIELDS as f64;
                 covered[c] += f64::from(u8::from((e.low..=e.high).contains(&mean))) / TRIALS as f64;
@@ -477,6 +481,8 @@ mod tests {
         assert!(covered.iter().all(|part| *part > 0.9), "{covered:?}");
         assert!(width.iter().all(|w| *w < 0.3), "{width:?}");
         assert!(spread[0] < 0.1 && (0.11..0.2).contains(&spread[1]), "{spread:?}");
+        // The fields themselves, although their statistics are not linear.
+        assert!(off[0] < 0.06 && off[1] < 0.06, "{off:?}");
     }
 
     #[test]

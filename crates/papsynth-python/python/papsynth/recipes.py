@@ -447,6 +447,11 @@ class Cytoplasm(Section):
     angularity: Number | None = None
     """Angularity of the outline: 0 is smooth, 1 a polygon. From 0 to 1."""
 
+    elongation: Number | None = None
+    """Length of a cell relative to its width, in addition to the shape of its class: the cell is stretched along its long
+    axis and keeps its area. From 0.2 to 5.
+    """
+
     notches: Number | None = None
     """Number of notches of the rim. From 0 to 20."""
 
@@ -500,6 +505,11 @@ class Cytoplasm(Section):
 
     granules: Number | None = None
     """Number of granules of a granular cell per 100 µm². From 0 to 1000."""
+
+    degeneration: Number | None = None
+    """Degeneration: dark granular material at the rim and in patches, and a frayed rim; above 1, the material covers the
+    cell. The number is the absorbance of the material relative to the cytoplasm. From 0 to 5.
+    """
 
     fray_um: Number | None = None
     """Amplitude of the irregularity of the outline. From 0 to 5 µm."""
@@ -899,8 +909,11 @@ class Leukocytes(Section):
     0.60 and 0.76; - absorbance of the core 0.32, 0.47 and 0.65, its standard deviation inside the core 0.032, 0.058 and
     0.085; - absorbance 1 to 2 µm outside the outline 0.05, 0.09 and 0.22. The logarithm of the absorbance of the core
     has a standard deviation of 0.16 within and 0.24 between fields. The slope of the edge is 0.14 to 0.20 of the
-    contrast per pixel. There are about 45 leukocytes per mm². About two thirds of the clusters are single leukocytes;
-    one to three in a hundred clusters have more than 10. The centres of touching leukocytes are 5 to 10 µm apart.
+    contrast per pixel. The area with an absorbance above 0.045, cytoplasm included, is 96, 122 and 156 µm² at 25 %, 50
+    % and 75 % of 35 isolated bodies of eight normal fields. The fractions of degenerated and pyknotic leukocytes, and
+    of those on cells, are estimates by eye. There are about 45 leukocytes per mm². About two thirds of the clusters are
+    single leukocytes; one to three in a hundred clusters have more than 10. The centres of touching leukocytes are 5 to
+    10 µm apart.
     """
 
     clusters: Abundance | None = None
