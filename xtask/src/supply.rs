@@ -40,12 +40,20 @@ pub(crate) fn bill(workspace: &Workspace) -> Result<PathBuf> {
         }
         fs::remove_file(&written).with_context(|| format!("cannot remove {}", written.display()))?;
     }
-    let text = text.replace(&*workspace.root.to_string_lossy(), "");
+    let text = without_folders(&text.replace(&*workspace.root.to_string_lossy(), ""));
     let mut bill: Value = serde_json::from_str(&text).context("the output of cargo-cyclonedx")?;
     bill["metadata"].as_object_mut().and_then(|metadata| metadata.remove("timestamp"));
     let path = workspace.target.join(format!("{NAME}.json"));
     shell::write(&path, &format!("{bill:#}\n"))?;
     Ok(path)
+}
+
+/// Removes the folders of our crates from a bill of materials: everyone else finds them in the registry.
+fn without_folders(bill: &str) -> String {
+    let mut parts = bill.split("?download_url=file://");
+    let first = parts.next().unwrap_or_default();
+    let rest = parts.map(|part| part.trim_start_matches(|c| !['"', '#'].contains(&c)));
+    std::iter::once(first).chain(rest).collect()
 }
 
 /// Returns a program, which Cargo installs with these features below the target folder if this version is missing.
@@ -85,4 +93,17 @@ pub(crate) fn publish(workspace: &Workspace) -> Result<()> {
     let names: Vec<&str> = published.flat_map(|package| ["--package", &package.name]).collect();
     shell::run(workspace.cargo().arg("clean").args(&names))?;
     shell::run(workspace.cargo().args(["package", "--locked", "--allow-dirty"]).args(&names))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bill_of_materials_names_no_folders() {
+        let bill =
+            r#"["pkg:cargo/a@1?download_url=file://../a", "pkg:cargo/b@1?download_url=file://.#src/main.rs", 1]"#;
+        assert_eq!(without_folders(bill), r#"["pkg:cargo/a@1", "pkg:cargo/b@1#src/main.rs", 1]"#);
+        assert_eq!(without_folders("[]"), "[]");
+    }
 }
