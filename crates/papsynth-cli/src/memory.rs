@@ -15,6 +15,12 @@ const THREAD_ADDRESSES: u64 = 66 << 20;
 /// Address space that the program needs to read a recipe and a model, bytes.
 const PROGRAM_ADDRESSES: u64 = 128 << 20;
 
+/// The allocator of musl maps blocks of 128 KiB or more one by one, and the system clears each of their pages again.
+/// That takes a third more processor time. This one takes 3 % more than glibc, and as little memory.
+#[cfg(target_env = "musl")]
+#[global_allocator]
+static ALLOCATOR: dlmalloc::GlobalDlmalloc = dlmalloc::GlobalDlmalloc;
+
 /// Memory that a run may use, and the limit that it follows from.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Budget {
