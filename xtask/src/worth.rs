@@ -18,9 +18,14 @@ const PACKAGES: &str = "numpy\npillow\nscipy\n\
 /// Number of fields generated for each grade.
 const FRAMES: &str = "40";
 
-/// Changes of the matched recipes: more objects that look like nuclei, and nuclei that differ more in darkness and
-/// texture than those of one slide (docs/WORTH.md).
-const FOR_TRAINING: [&str; 2] = ["debris.leukocytes.clusters.per_mm2.uniform=[10,120]", "stain.nucleus_variation=1"];
+/// Changes of the matched recipes: more objects that look like nuclei, and more degenerated cells (docs/WORTH.md).
+const FOR_TRAINING: [&str; 2] = [
+    "debris.leukocytes.clusters.per_mm2.uniform=[10,120]",
+    "cytoplasm.degeneration={ log_normal = [0.3, 1], max = 2 }",
+];
+
+/// Factor of `papsynth generate --widen`.
+const WIDEN: &str = "1.5";
 
 /// Presets of the overlapping cells on which networks are trained: name and number of fields.
 const OVERLAP_TRAINING: [(&str, &str); 2] = [("lbc", "300"), ("dense", "80")];
@@ -50,7 +55,7 @@ pub(crate) struct Worth {
     #[arg(long, conflicts_with_all = ["widen", "other", "only"])]
     overlap: bool,
     /// Factor of `papsynth generate --widen`
-    #[arg(long, value_name = "FACTOR", default_value = "1")]
+    #[arg(long, value_name = "FACTOR", default_value = WIDEN)]
     widen: String,
     /// Also trains on another set: a data set of papsynth, or a folder of PNG files and CSV files with centres (y, x);
     /// repeatable
@@ -89,7 +94,7 @@ pub(crate) fn run(workspace: &Workspace, options: &Worth) -> Result<()> {
         let real = halves[half].display().to_string();
         let synthetic = synthetic.display().to_string();
         let name = match options.widen.as_str() {
-            "1" => "synthetic".to_owned(),
+            WIDEN => "synthetic".to_owned(),
             factor => format!("synthetic_widened_{}", factor.replace('.', "_")),
         };
         let mut arms = vec![
