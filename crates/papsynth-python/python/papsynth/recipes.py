@@ -1082,11 +1082,6 @@ class Nucleus(Section):
     wrinkled: Number | None = None
     """Probability that a nucleus is wrinkled or angular. From 0 to 1."""
 
-    off_centre: Number | None = None
-    """Factor by which the distance of a nucleus from the centre of its cell is multiplied. The nucleus stays inside the
-    cell. Drawn for each cell. From 0 to 10.
-    """
-
     rim: Number | None = None
     """Absorbance of the rim (the nuclear membrane) relative to the nucleus. From 0 to 2."""
 

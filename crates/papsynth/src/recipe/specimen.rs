@@ -402,9 +402,6 @@ section! {
         pyknotic: Number = 0.05, 0..=1;
         /// Probability that a nucleus is wrinkled or angular.
         wrinkled: Number = 0.15, 0..=1;
-        /// Factor by which the distance of a nucleus from the centre of its cell is multiplied. The nucleus stays inside
-        /// the cell. Drawn for each cell.
-        off_centre: Number = 1.0, 0..=10;
         /// Absorbance of the rim (the nuclear membrane) relative to the nucleus.
         rim: Number = Number::uniform(0.0, 0.2), 0..=2;
         /// Fraction of the thickness of a nucleus that is domed: 0 is a plate, 1 an ellipsoid.

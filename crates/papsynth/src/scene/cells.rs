@@ -219,9 +219,7 @@ fn draw_body(
     // The texture adds up at random over the thickness, as in `phantom/cell/detail.rs`.
     detail.texture *= strength.median * libm::exp(stain.texture_variation * deviation) / thickness.sqrt();
     let fold = draw_fold(recipe, cytoplasm.pliability, rng);
-    let (purpose, factor) = named!(recipe.nucleus.off_centre);
-    let distance = (nucleus.off_centre.mean + nucleus.off_centre.sd * random::normal(rng)).clamp(0.0, 1.0)
-        * factor.draw(&mut own(purpose));
+    let distance = (nucleus.off_centre.mean + nucleus.off_centre.sd * random::normal(rng)).clamp(0.0, 1.0);
     // The nucleus stays inside the cell, which can be narrow.
     let narrowness = detail.elongation.max(1.0 / detail.elongation).sqrt();
     let distance = distance.min((0.85 - narrowness * nucleus_um / radius_um).max(0.0));

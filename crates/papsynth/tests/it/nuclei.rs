@@ -35,20 +35,6 @@ fn cells_of(change: impl Fn(&mut Recipe)) -> Vec<CellBody> {
 }
 
 #[test]
-fn a_factor_moves_nuclei_from_the_centre_and_keeps_them_inside() {
-    let [usual, doubled, far] =
-        [1.0, 2.0, 10.0].map(|factor| cells_of(|recipe| recipe.nucleus.off_centre = factor.into()));
-    let distance = |cell: &CellBody| libm::hypot(cell.nucleus.off_centre[0], cell.nucleus.off_centre[1]);
-    let room = |cell: &CellBody| (0.85 - cell.nucleus.radius_um / cell.radius_um).max(0.0);
-    assert!(usual.len() > 100 && usual.len() == doubled.len());
-    for ((usual, doubled), far) in usual.iter().zip(&doubled).zip(&far) {
-        let expected = (2.0 * distance(usual)).min(room(usual));
-        assert!((distance(doubled) - expected).abs() < 1e-9, "{}: {} {expected}", usual.class, distance(doubled));
-        assert!(distance(far) <= room(far) + 1e-9);
-    }
-}
-
-#[test]
 fn nuclei_replace_the_displaced_part_of_a_cell_of_their_class() {
     const DISPLACEMENT: f64 = 0.8;
     let (model, [none, much]) = (Model::builtin(), [0.0, DISPLACEMENT].map(cells));
