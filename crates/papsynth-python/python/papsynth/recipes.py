@@ -507,8 +507,8 @@ class Cytoplasm(Section):
     """Number of granules of a granular cell per 100 µm². From 0 to 1000."""
 
     degeneration: Number | None = None
-    """Degeneration: dark granular material at the rim and in patches, and a frayed rim; above 1, the material covers the
-    cell. The number is the absorbance of the material relative to the cytoplasm. From 0 to 5.
+    """Degeneration: dark granular material at the rim and in patches, and a frayed rim. The number is the absorbance of
+    the material relative to the cytoplasm. Above 1, the material covers the cell. From 0 to 5.
     """
 
     fray_um: Number | None = None

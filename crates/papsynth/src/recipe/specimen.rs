@@ -313,8 +313,8 @@ section! {
         /// Number of granules of a granular cell per 100 µm².
         granules: Number
             (given f64 as granules: "Number of granules per 100 µm², 0 if the cell is not granular.") = Number::log_normal(12.0, 0.6), 0..=1000;
-        /// Degeneration: dark granular material at the rim and in patches, and a frayed rim; above 1, the material covers
-        /// the cell. The number is the absorbance of the material relative to the cytoplasm.
+        /// Degeneration: dark granular material at the rim and in patches, and a frayed rim. The number is the
+        /// absorbance of the material relative to the cytoplasm. Above 1, the material covers the cell.
         degeneration: Number (given f64) = 0.0, 0..=5;
         /// Amplitude of the irregularity of the outline.
         fray_um: Number = Number::log_normal(0.65, 0.45), 0..=5, "µm";
