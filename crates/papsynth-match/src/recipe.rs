@@ -493,7 +493,9 @@ mod tests {
 
     #[test]
     fn values_of_a_recipe_are_read_back() {
-        let setting = setting(true);
+        let mut setting = setting(true);
+        // A recipe without degenerated cells keeps them out.
+        setting.base.cytoplasm.degeneration = 0.2.into();
         let values = Values::at(&std::array::from_fn(|i| 0.2 + 0.6 * (i as f64) / PARAMETERS.len() as f64));
         let made = recipe(&setting, &values, |_| true);
         let back = Setting { base: made, ..setting }.base_values();
