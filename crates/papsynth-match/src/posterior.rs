@@ -299,7 +299,7 @@ fn deviations(
         })
         .collect();
     let mut variances = DVector::from_element(moving.len(), PRIOR_SPREAD * PRIOR_SPREAD);
-    let mut apart = Vec::new();
+    let mut apart = vec![DVector::zeros(moving.len()); seen.len()];
     let mut unsure = variances.clone();
     let freedom = seen.len().saturating_sub(1) as f64;
     for _ in 0..EM_STEPS {
