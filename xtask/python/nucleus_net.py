@@ -1,13 +1,16 @@
 """Trains a small U-Net to find nuclei, and tests it on real fields.
 
-    nucleus_net.py --train SET [SET ...] --test FOLDER --out RESULT.json [--mask IMAGE MASK] [--steps N] [--seed N] [--weights FILE]
+    nucleus_net.py --train SET [SET ...] --test FOLDER --out RESULT.json [--mask IMAGE MASK]
+                   [--steps N] [--seed N] [--weights FILE]
 
-A SET is a data set of `papsynth generate`, or a folder of data sets, of which the masks of nuclei are learned, or a folder of PNG and CSV files with
-the centres of nuclei (y, x), of which discs are learned. SET:N uses its first N fields. Each batch has equally many crops of all SETs; the last third
-of the steps uses the last SET alone, so that a network that learns from synthetic and real fields ends with real ones. In data sets, a part of the
-crops show objects that look like nuclei, and their pixels count as much as those of nuclei. FOLDER holds real fields with centres and frames.csv with
-their grades. A nucleus is found if a detection lies within 12 pixels (4 µm). Writes the numbers of found, detected and annotated nuclei of every
-field, and the Dice coefficient of a mask at several scales, as JSON.
+A SET is a data set of `papsynth generate`, or a folder of data sets, of which the masks of nuclei are learned, or a
+folder of PNG and CSV files with the centres of nuclei (y, x), of which discs are learned. SET:N uses N fields, evenly
+spread over its files. Each batch has equally many crops of all SETs; the last third of the steps uses the last SET
+alone, so that a network that learns from synthetic and real fields ends with real ones. In data sets, a part of the
+crops show objects that look like nuclei, and their pixels count as much as those of nuclei. FOLDER holds real fields
+with centres and frames.csv with their grades. A nucleus is found if a detection lies within 12 pixels (4 µm). Writes
+the numbers of found, detected and annotated nuclei of every field, and the Dice coefficient of a mask at several
+scales, as JSON.
 """
 
 import argparse
@@ -27,9 +30,10 @@ from scipy.optimize import linear_sum_assignment
 SIDE, BATCH = 192, 8  # of the crops of a batch
 DISC = 10  # radius of the discs at annotated centres, pixels
 REACH = 12  # largest distance of a detection from a nucleus, pixels
-THRESHOLD = 0.85  # probability, fixed before any test
+THRESHOLD = 0.85  # probability of detections, fixed before any test
+MASK_THRESHOLD = 0.5  # probability of masks
 SMALLEST = 60  # area of a detection, pixels
-SCALES = (1.0, 0.94)  # of the image with a mask, whose pixel size is not known exactly
+SCALES = (1.0, 1.2)  # of the image with a mask, whose pixel size is not known
 CHANNELS = 12  # of the first level of the network
 CONTRAST = 4.0  # factor on the images
 LAST = 1 / 3  # part of the steps in which only the last set is used
@@ -62,18 +66,24 @@ def discs(shape, places):
     return mask
 
 
+def chosen(files, count):
+    """Return `count` evenly spread files, or all if it is None. Files of one grade follow each other."""
+    count = len(files) if count is None else min(count, len(files))
+    return [files[int((number + 0.5) * len(files) / count)] for number in range(count)]
+
+
 def load(name):
     """Return the fields of a set: image, mask of nuclei separated where they touch, mask of objects that look like nuclei."""
     path, _, count = name.partition(":")
     folder, count = Path(path), int(count) if count else None
     sets = [folder] if (folder / "images").is_dir() else sorted(file.parent for file in folder.glob("*/images"))
     if not sets:
-        files = sorted(folder.glob("*.png"))[:count]
+        files = chosen(sorted(folder.glob("*.png")), count)
         images = [normalized(Image.open(file)) for file in files]
         masks = [discs(image.shape, centres(file.with_suffix(".csv"))) for image, file in zip(images, files)]
         return [(image, mask, np.zeros_like(mask)) for image, mask in zip(images, masks)]
     fields = []
-    for file in sorted(file for one in sets for file in (one / "images").glob("*.png"))[:count]:
+    for file in chosen(sorted(file for one in sets for file in (one / "images").glob("*.png")), count):
         labels, classes = (
             np.asarray(Image.open(next((file.parent.parent / "labels" / part).glob(f"{file.stem}.*"))))
             for part in ("nucleus", "semantic")
@@ -187,14 +197,22 @@ def matches(found, true):
     return int((distance[rows, columns] <= REACH).sum())
 
 
+def away_from_border(mask):
+    """Return a mask without its regions at the border of the image."""
+    regions, _ = ndimage.label(mask)
+    border = np.concatenate([regions[0], regions[-1], regions[:, 0], regions[:, -1]])
+    return mask & ~np.isin(regions, border[border > 0])
+
+
 def dice(net, image, mask):
-    """Return the Dice coefficient of a mask of nuclei, at each scale of the image."""
+    """Return the Dice coefficient of a mask of nuclei, at each scale of the image. Nuclei at the border are left out."""
     scores = []
     for scale in SCALES:
         found = ndimage.zoom(probability(net, ndimage.zoom(image, scale, order=1)), 1 / scale, order=1)
         height, width = (min(sizes) for sizes in zip(found.shape, mask.shape))
-        pair = found[:height, :width] > THRESHOLD, mask[:height, :width] > 0
-        scores.append(float(2 * (pair[0] & pair[1]).sum() / max(pair[0].sum() + pair[1].sum(), 1)))
+        found = away_from_border(found[:height, :width] > MASK_THRESHOLD)
+        true = away_from_border(mask[:height, :width] > 0)
+        scores.append(float(2 * (found & true).sum() / max(found.sum() + true.sum(), 1)))
     return scores
 
 

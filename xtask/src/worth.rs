@@ -37,9 +37,9 @@ const OVERLAP_TESTS: [(&str, &str); 2] = [("extended-focus", "60"), ("lsil", "40
 ///
 /// Needs PAPSYNTH_REFERENCE. `papsynth match` fits a recipe to every second real field of each grade; a U-Net is
 /// trained on fields of the three recipes, on those real fields, or on both, and finds the nuclei of the other half.
-/// Then the halves change places. Every training is written to target/worth, where an interrupted run continues; a
-/// table is printed. Delete target/worth after a change of papsynth. Each training takes about ten minutes on 2
-/// cores; all of them take five hours. docs/WORTH.md tells what was measured.
+/// Then the halves change places. Every training and its weights are written to target/worth, where an interrupted run
+/// continues; a table is printed. Delete target/worth after a change of papsynth. Each training takes seven minutes on
+/// one core; all of them take four hours. docs/WORTH.md tells what was measured.
 ///
 /// With --overlap: trains networks on complete masks of overlapping cells, and tests them on synthetic fields of other
 /// presets. Prints the Dice coefficients of found cells and the share of missed cells. Needs no real fields.
@@ -122,7 +122,8 @@ pub(crate) fn run(workspace: &Workspace, options: &Worth) -> Result<()> {
         let mut command = Command::new(&python);
         command.arg(workspace.root.join("xtask/python/nucleus_net.py")).arg("--train").args(sets);
         command.arg("--test").arg(&halves[1 - half]).arg("--out").arg(&result);
-        command.args(["--seed", &seed.to_string(), "--steps", &options.steps.to_string(), "--mask"]);
+        command.args(["--seed", &seed.to_string(), "--steps", &options.steps.to_string(), "--weights"]);
+        command.arg(result.with_extension("weights.h5")).arg("--mask");
         command.args(["extended_focus.png", "nuclei.png"].map(|name| reference.join("focus_stack").join(name)));
         shell::run(&mut command)?;
     }
@@ -158,7 +159,7 @@ fn overlap(workspace: &Workspace, options: &Worth) -> Result<()> {
         command.arg("--train").args(OVERLAP_TRAINING.map(|(preset, _)| folder.join(preset)));
         command.arg("--test").args(OVERLAP_TESTS.map(|(preset, _)| folder.join(preset)));
         command.args(["--seed", &seed.to_string(), "--steps", &options.steps.to_string(), "--out"]);
-        shell::run(command.arg(&result))?;
+        shell::run(command.arg(&result).arg("--weights").arg(result.with_extension("")))?;
     }
     let mut command = Command::new(&python);
     let table = shell::output(command.arg(workspace.root.join("xtask/python/overlap_table.py")).arg(&results))?;

@@ -79,7 +79,7 @@ pub(crate) fn run(args: &args::Match) -> Result<(), ExitError> {
     let mut text = summary(&fit);
     if let (Some(file), Some(path), Some(page)) = (page_file, &args.page, page) {
         file.write(page.to_html().as_bytes())?;
-        text.push_str(&format!("\n{}{}\n", page.to_text(), path.display()));
+        text.push_str(&format!("\n{}{}: the fields side by side\n", page.to_text(), path.display()));
     }
     recipe_file.write(fit.to_toml().as_bytes())?;
     let out = args.out.display();
@@ -134,12 +134,16 @@ fn exit_error(error: &Error, real: &std::path::Path) -> ExitError {
 
 fn summary(fit: &Fit) -> String {
     let extended = if fit.extended {
-        "the fields have an extended depth of field, so the match begins with that of the preset\n"
+        "the fields are fused from several focal planes: focus, noise and softness of edges begin with those of the \
+         preset extended-focus\n"
     } else {
         ""
     };
+    let shown = |a: &&ParameterFit| a.origin != Origin::NotVisible;
+    let name = |a: &ParameterFit| if a.unit.is_empty() { a.path.to_owned() } else { format!("{}, {}", a.path, a.unit) };
+    let wide = fit.parameters.iter().filter(shown).map(|a| name(a).chars().count()).max().unwrap_or(0);
     let mut text = format!(
-        "{}, {}; {} simulated\n{extended}\n{:<26} {:>10} {:>21} {:>10} {:>10}  source\n",
+        "{}, {}; {} simulated\n{extended}\n{:<wide$} {:>10} {:>21} {:>10} {:>10}  source\n",
         counted(fit.fields.len() as u64, "field", "fields"),
         counted(fit.nuclei as u64, "nucleus", "nuclei"),
         counted(fit.simulated as u64, "field", "fields"),
@@ -154,16 +158,16 @@ fn summary(fit: &Fit) -> String {
         let [low, high] = a.interval.map(number);
         let interval = format!("{low} to {high}");
         let origin = if a.origin == Origin::Measured { "measured" } else { "simulated" };
-        let name = if a.unit.is_empty() { a.parameter.name() } else { format!("{}, {}", a.parameter.name(), a.unit) };
+        let name = name(a);
         let spread = if a.fields.is_empty() { "-".to_owned() } else { number(a.spread) };
         let (value, before) = (number(a.value), number(a.before));
-        format!("{name:<26} {value:>10} {interval:>21} {spread:>10} {before:>10}  {origin}\n")
+        format!("{name:<wide$} {value:>10} {interval:>21} {spread:>10} {before:>10}  {origin}\n")
     };
-    text.extend(fit.parameters.iter().filter(|a| a.origin != Origin::NotVisible).map(line));
-    let lost: Vec<String> =
-        fit.parameters.iter().filter(|a| a.origin == Origin::NotVisible).map(|a| a.parameter.name()).collect();
+    text.extend(fit.parameters.iter().filter(shown).map(line));
+    let lost = fit.parameters.iter().filter(|a| a.origin == Origin::NotVisible);
+    let lost: Vec<String> = lost.map(|a| format!("    {}\n", a.path)).collect();
     if !lost.is_empty() {
-        text.push_str(&format!("no visible influence, unchanged: {}\n", lost.join(", ")));
+        text.push_str(&format!("without visible influence on these fields, unchanged:\n{}", lost.concat()));
     }
     let d = fit.distance;
     text.push_str(&format!(
@@ -203,7 +207,7 @@ fn summary(fit: &Fit) -> String {
 fn in_words(name: &str) -> String {
     let Some((_, feature)) = name.split_once(": ") else { return describe(name) };
     match feature.strip_suffix(", sd") {
-        Some(feature) => format!("{}, spread within a field", describe(feature)),
+        Some(feature) => format!("{}, ln of the spread within a field", describe(feature)),
         None => describe(feature),
     }
 }

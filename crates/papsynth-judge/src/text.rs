@@ -6,10 +6,13 @@ use crate::judge::{Conclusion, Report};
 const PRINTED: usize = 5;
 
 impl Report {
-    /// Returns a summary as plain text: each test with its conclusion and the most important features, then all notes.
+    /// Returns a summary as plain text: warnings, then each test with its conclusion and the most important features.
     #[must_use]
     pub fn to_text(&self) -> String {
         let mut text = String::new();
+        for warning in &self.warnings {
+            text.push_str(&format!("warning: {warning}\n"));
+        }
         for test in &self.two_sample {
             let (name, r, conclusion, [low, high]) = (&test.name, &test.result, test.conclusion, test.result.interval);
             let halves = r.null_median().map_or("unknown (too few fields)".to_owned(), |auc| format!("{auc:.2}"));
@@ -43,9 +46,6 @@ impl Report {
         let [real, synthetic] = self.fields.each_ref().map(Vec::len);
         let conclusion = self.conclusion;
         text.push_str(&format!("{real} real fields and {synthetic} synthetic fields: {conclusion}\n"));
-        for warning in &self.warnings {
-            text.push_str(&format!("warning: {warning}\n"));
-        }
         text
     }
 }

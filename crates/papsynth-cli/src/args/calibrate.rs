@@ -22,14 +22,14 @@ Examples:
   papsynth calibrate --flat flats --dark darks --bits 12
   papsynth preview calibration/optics.toml
 
-Images are grey PNG or TIFF files, ordered by the numbers in their names. The planes of a stack have
-equal distances and are on both sides of focus; the folder holds no other images. Without --window,
-nuclei are found automatically as dark, compact, sharp objects, and the fit uses their medians.
-Without --step-um, distances are in planes; without --pixel-um, blur is in pixels. Such values are
+Images are grey PNG or TIFF files, ordered by the numbers in their names. The planes of a stack have \
+equal distances and are on both sides of focus; the folder holds no other images. Without --window, \
+nuclei are found automatically as dark, compact, sharp objects, and the fit uses their medians. \
+Without --step-um, distances are in planes; without --pixel-um, blur is in pixels. Such values are \
 not written to recipes.
 
-Flats are images of an even field: 2 or more per level, from near dark to bright, and 2 or more dark
-frames. Variations wider than 15 pixels count as illumination. A folder of flats holds either a
+Flats are images of an even field: 2 or more per level, from near dark to bright, and 2 or more dark \
+frames. Variations wider than 15 pixels count as illumination. A folder of flats holds either a \
 subfolder per level and one named `dark`,
   flats/dark/1.tif  flats/dark/2.tif  flats/5ms/1.tif  flats/5ms/2.tif  flats/9ms/1.tif ...
 or only files, where two consecutive files, by name, have the same light:

@@ -21,14 +21,14 @@ Examples:
   papsynth judge slides fields --pixel-um 0.33 --group N --out report      only negative fields
   papsynth judge slides other-slides --pixel-um 0.33 --synthetic-pixel-um 0.25 --out report
 
-REAL and SYNTHETIC are each a data set of `papsynth generate`, or a folder of PNG, JPEG or TIFF images
+REAL and SYNTHETIC are each a data set of `papsynth generate`, or a folder of PNG, JPEG or TIFF images \
 of 8 or 16 bits; of colour images the green channel is used. A folder may also hold:
   NAME.csv     points in the nuclei of NAME.png, one `y,x` per line
   masks/       masks or label images of nuclei, with the names of the images
   frames.csv   the group of each image, with the columns `frame,grade`
-Nuclei come from masks if all fields of both folders have them, else from points if all fields have
-points or masks, else they are found automatically: always in the same way in both folders. If pixel
-sizes differ, the images with smaller pixels are averaged to the larger size. The page shows parts of
+Nuclei come from masks if all fields of both folders have them, else from points if all fields have \
+points or masks, else they are found automatically: always in the same way in both folders. If pixel \
+sizes differ, the images with smaller pixels are averaged to the larger size. The page shows parts of \
 the images.")]
 pub(crate) struct Judge {
     /// Folder with 2 or more real fields
@@ -86,12 +86,12 @@ Examples:
   papsynth match slides --find-pixel --quick --out mine.toml
   papsynth generate mine.toml --out fields --frames 20
 
-REAL is a folder as for `papsynth judge`: 2 or more images of one size and one magnification. Nuclei come
-from masks or points if all fields have them, else they are found automatically; always in the same way
-in real and simulated fields. Points must mark all nuclei, else use --nuclei search. If all fields are
+REAL is a folder as for `papsynth judge`: 2 or more images of one size and one magnification. Nuclei come \
+from masks or points if all fields have them, else they are found automatically; always in the same way \
+in real and simulated fields. Points must mark all nuclei, else use --nuclei search. If all fields are \
 colour images, the dyes of nuclei and cytoplasm are matched as well, and the recipe is one of colour images.
 
-Eight fields of 1280 x 960 pixels take about two minutes on two cores; the progress line shows the time
+Eight fields of 1280 x 960 pixels take about two minutes on two cores; the progress line shows the time \
 left. Ctrl-C ends the match, and no file is written.")]
 pub(crate) struct Match {
     /// Folder of real fields
@@ -124,8 +124,8 @@ pub(crate) struct Match {
     /// Simulate fewer fields, for a first impression: wider intervals
     #[arg(long)]
     pub(crate) quick: bool,
-    /// Then search ROUNDS times for parameters with which classifiers distinguish simulated from real fields less
-    /// often; half of the fields are held out
+    /// Then improve the recipe in this many rounds, so that classifiers tell simulated from real fields less often; half
+    /// of the fields are held out
     #[arg(long, value_name = "ROUNDS", default_value_t = 0, hide_default_value = true, value_parser = integer(0, 10_000_usize))]
     pub(crate) refine: usize,
     /// Model of `papsynth learn`, or class file (TOML), in addition to the built-in classes

@@ -22,8 +22,8 @@ Examples:
       --out mine.json
   papsynth learn --cytoplasm fields --pixel-um 0.33 --out mine.json
 
-Images are grey PNG, JPEG or TIFF files; masks and label images are 0 outside the objects. An
-outline file is a CSV file with the columns outline, k, x_px, y_px: name of the outline, index of the
+Images are grey PNG, JPEG or TIFF files; masks and label images are 0 outside the objects. An \
+outline file is a CSV file with the columns outline, k, x_px, y_px: name of the outline, index of the \
 point from 0, and its position in pixels.")]
 pub(crate) struct Learn {
     /// Class to learn: a new class, or a class of the base model to replace

@@ -153,8 +153,8 @@ Examples:
   papsynth submit kubernetes --tasks 50 --image registry.example/papsynth:0.1 \\
       -- --out /data/many --frames 100000 > job.yaml
 
-Tasks that fail with an input/output error (exit code 74) are run again; tasks that fail with an
-error in usage, recipe or input (2) are not. When all tasks are done, run papsynth status, then
+Tasks that fail with an input/output error (exit code 74) are run again; tasks that fail with an \
+error in usage, recipe or input (2) are not. When all tasks are done, run papsynth status, then \
 papsynth merge.")]
 pub(crate) struct Submit {
     /// Scheduler of the cluster

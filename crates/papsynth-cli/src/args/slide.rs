@@ -23,7 +23,7 @@ Examples:
   papsynth slide finalize big
   papsynth verify big
 
-A slide is an OME-Zarr 0.5 image with labels, and a table and a GeoJSON file of objects per
+A slide is an OME-Zarr 0.5 image with labels, and a table and a GeoJSON file of objects per \
 shard.")]
 pub(crate) struct Slide {
     /// The subcommand.

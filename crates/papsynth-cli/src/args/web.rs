@@ -24,14 +24,14 @@ Examples:
   papsynth study real fields --pixel-um 0.33                     resample to equal pixel sizes
   papsynth study --results results                               Table 1 of the paper
 
-REAL and SYNTHETIC are folders of PNG, JPEG or TIFF images, data sets of papsynth, or folders of several
-data sets with different settings; results are then also listed by the settings that differ, and by
+REAL and SYNTHETIC are folders of PNG, JPEG or TIFF images, data sets of papsynth, or folders of several \
+data sets with different settings; results are then also listed by the settings that differ, and by \
 defocus, stain and density. Of colour images the green channel is shown, of stacks the centre plane.
 
-Grey levels are shown unchanged; --grey glass scales each field to equal background brightness. If
-both pixel sizes are known, the images with smaller pixels are resampled. Patches have random
-positions, 8 pixels or more from the border. At least a fifth of a patch is 8 % darker than the
-background, and two patches overlap by a quarter at most. In the folder of --out, each subject has a
+Grey levels are shown unchanged; --grey glass scales each field to equal background brightness. If \
+both pixel sizes are known, the images with smaller pixels are resampled. Patches have random \
+positions, 8 pixels or more from the border. At least a fifth of a patch is 8 % darker than the \
+background, and two patches overlap by a quarter at most. In the folder of --out, each subject has a \
 folder with trials.csv, summary.json, and the state of the session.
 
 An accuracy near 0.5 with a margin of ±5 points needs 384 trials, of one or more subjects.")]
@@ -107,7 +107,7 @@ Examples:
   papsynth view stacks --open            open the browser
   papsynth view slide --port 8080        a slide; needs a build with --features zarr
 
-Drag to pan, turn the wheel to zoom, turn it with Shift to focus, click to identify an object. The
+Drag to pan, turn the wheel to zoom, turn it with Shift to focus, click to identify an object. The \
 address in the browser stores image, position, focus and labels. Press Ctrl-C to quit.")]
 pub(crate) struct View {
     /// Folder of the data set or slide
@@ -135,9 +135,9 @@ Examples:
   papsynth workbench --with calibrated.toml        sections of `papsynth calibrate` or `papsynth match`
   papsynth workbench --port 8080 --max-memory 2GiB
 
-The page marks what differs from the preset, the default preset for a recipe in a file. It shows the command line and
-the Python code that generate the same field, and its link holds preset, differences, seed and view: it opens the same
-field in the workbench of another person. Drag to pan, turn the wheel to zoom, turn it with Shift to focus, click to
+The page marks what differs from the preset, the default preset for a recipe in a file. It shows the command line and \
+the Python code that generate the same field, and its link holds preset, differences, seed and view: it opens the same \
+field in the workbench of another person. Drag to pan, turn the wheel to zoom, turn it with Shift to focus, click to \
 identify an object. Press Ctrl-C to quit.")]
 pub(crate) struct Workbench {
     #[command(flatten)]
