@@ -11,7 +11,7 @@ FIELDS = 3
 BASE = {"field": {"width_px": 640, "height_px": 480}}
 
 STUDIES = {
-    "focus.centre_um": [0.0, 2.0, 4.0, 8.0, 12.0],
+    "focus.centre_um": [0.0, 4.0, 8.0, 12.0, 16.0],
     "debris.leukocytes.clusters": [0, 4, 12, 30],
     "background.level": [0.2, 0.5, 0.85],
 }

@@ -20,15 +20,18 @@ def test_a_sweep_shows_where_a_segmenter_breaks():
 
     table = sweep.main()
     assert table["debris.leukocytes.clusters", 30] < table["debris.leukocytes.clusters", 0] - 0.1
-    assert table["focus.centre_um", 12.0] < table["focus.centre_um", 4.0]
+    # Up to 12 µm, blur hides more wrong objects than nuclei.
+    assert table["focus.centre_um", 16.0] < table["focus.centre_um", 4.0] - 0.1
 
 
 def test_two_segmenters_are_told_apart():
     import benchmark
 
     table = benchmark.main()
-    assert len(table) == 8 and all(0 < value <= 1 for value in table.values())
-    assert table["inflamed", "threshold"] < table["lbc", "threshold"]
+    assert len(table) == 8 and all(0 <= value <= 1 for value in table.values())
+    for name in benchmark.SEGMENTERS:
+        # Both take leukocytes for nuclei.
+        assert table["inflamed", name] < table["lbc", name] - 0.3
 
 
 def test_what_was_trained_on_synthetic_fields_finds_nuclei_in_others_and_in_real_ones():
