@@ -175,7 +175,7 @@ fn root_line(text: &str) -> Result<&str> {
 /// Returns a command that builds the program for this machine with the profile of the tests, and runs it.
 fn own_program(workspace: &Workspace) -> Command {
     let mut command = workspace.cargo();
-    command.args(["run", "--quiet", "--locked", "--package", PROGRAM, "--all-features", "--"]);
+    command.args(["run", "--locked", "--package", PROGRAM, "--all-features", "--"]);
     command
 }
 
