@@ -59,7 +59,9 @@ fn build_source(workspace: &Workspace) -> Result<()> {
     let source = file(workspace, ".tar.gz")?;
     shell::run(Command::new("tar").arg("-xzf").arg(source).arg("--strip-components=1").arg("-C").arg(&unpacked))?;
     let mut cargo = workspace.cargo();
-    cargo.args(["check", "--offline", "--locked", "--features", "cloud", "--manifest-path"]).arg(unpacked.join(package::PACKAGE).join("Cargo.toml"));
+    cargo
+        .args(["check", "--offline", "--locked", "--features", "cloud", "--manifest-path"])
+        .arg(unpacked.join(package::PACKAGE).join("Cargo.toml"));
     shell::run(cargo.env("CARGO_TARGET_DIR", &workspace.target))
 }
 
