@@ -18,6 +18,7 @@ use crate::args::Learn;
 use crate::exit::{self, ExitError};
 use crate::judge::{field_image, fields_of};
 use crate::output_file::{Kind, OutputFile};
+use crate::report::Spinner;
 use crate::setup::read_model;
 use crate::words::counted;
 use papsynth::recipe::diagnose::{nearest, quoted};
@@ -37,6 +38,7 @@ pub(crate) fn run(args: &Learn) -> Result<(), ExitError> {
     let mut base = read_model(args.base.as_deref())?;
     let mut textured = 0;
     if let Some(folder) = &args.cytoplasm {
+        let _spinner = Spinner::start("measuring the texture of cytoplasm");
         let images = cytoplasm(folder, args.pixel_um)?;
         textured = images.len();
         let params = CytoplasmParams { pixel_um: texture_pixel(args.pixel_um), source: source(args) };
