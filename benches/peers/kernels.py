@@ -3,11 +3,18 @@
 Each input line contains the name of a workload and a number of seconds. The workload runs for about this time, at least
 once. The output is a line of JSON with the CPU time of each run. Each workload runs once before its first measurement.
 """
+
 import os
-for threads in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS', 'NUMBA_NUM_THREADS'):
-    os.environ[threads] = '1'
-import json, math, sys, time
-import numpy as np, cv2
+
+for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ[threads] = "1"
+import json
+import math
+import sys
+import time
+
+import cv2
+import numpy as np
 import papsim
 
 cv2.setNumThreads(1)
@@ -29,15 +36,16 @@ def image():
 
 # Each function creates its inputs and returns the workload, and the number of parts that its time is divided by.
 
+
 def frame():
-    sim = papsim.PapSim(seed=3, accel='numba')
+    sim = papsim.PapSim(seed=3, accel="numba")
     return sim.frame, 1
 
 
 def cloth(rim, steps, parts):
     mesh, target = papsim.ClothMesh(rim), outline(rim)
     radius, rng = float(np.hypot(*target.T).max()) * 1.03, np.random.default_rng(1)
-    print(f'a sheet of {len(mesh.P)} vertices', file=sys.stderr)
+    print(f"a sheet of {len(mesh.P)} vertices", file=sys.stderr)
     return lambda: papsim.cloth_numba(rng, mesh, target, radius, steps, 2), parts
 
 
@@ -48,10 +56,12 @@ def blur(sigma):
 
 def noise():
     white, rng = np.full((HEIGHT, WIDTH), 17850, F), np.random.default_rng(1)
+
     def work():
         electrons = rng.poisson(white).astype(F)
         electrons += rng.standard_normal(electrons.shape, dtype=F) * F(70)
         return electrons
+
     return work, 1
 
 
@@ -60,7 +70,7 @@ def nucleus():
     donors = papsim.make_chromatin_samples(rng)
     y, x = (np.mgrid[:40, :40] + 0.5) / 20 - 1
     mask = (x * x + y * y < 1).astype(np.uint8)
-    return lambda: papsim.nucleus_texture(rng, mask, donors, accel='numba'), 1
+    return lambda: papsim.nucleus_texture(rng, mask, donors, accel="numba"), 1
 
 
 def cytoskeleton():
@@ -71,8 +81,13 @@ def cytoskeleton():
 
 def perlin():
     from pyfastnoiselite.pyfastnoiselite import FastNoiseLite, FractalType, NoiseType
+
     octave = FastNoiseLite(7)
-    octave.noise_type, octave.fractal_type, octave.frequency = NoiseType.NoiseType_Perlin, FractalType.FractalType_None, 1 / 64
+    octave.noise_type, octave.fractal_type, octave.frequency = (
+        NoiseType.NoiseType_Perlin,
+        FractalType.FractalType_None,
+        1 / 64,
+    )
     y, x = np.mgrid[:HEIGHT, :WIDTH].astype(F)
     coordinates = np.stack([x.ravel(), y.ravel()])
     return lambda: octave.gen_from_coords(coordinates), 1
@@ -80,22 +95,23 @@ def perlin():
 
 def gibson_lanni():
     from psfmodels import scalar_psf
+
     z = 0.2 * (np.arange(21) - 10.0)
     return lambda: scalar_psf(z, nx=127, dxy=0.05, pz=0.0, wvl=0.6), 1
 
 
 WORKS = {
-    'frame': frame,
-    'cloth-538': lambda: cloth(75, 60, 1),
-    'cloth-10000': lambda: cloth(328, 60, 60),
-    'blur-0.9': lambda: blur(0.9),
-    'blur-3.6': lambda: blur(3.6),
-    'blur-20': lambda: blur(20.0),
-    'noise': noise,
-    'nucleus': nucleus,
-    'cytoskeleton': cytoskeleton,
-    'perlin': perlin,
-    'gibson-lanni': gibson_lanni,
+    "frame": frame,
+    "cloth-538": lambda: cloth(75, 60, 1),
+    "cloth-10000": lambda: cloth(328, 60, 60),
+    "blur-0.9": lambda: blur(0.9),
+    "blur-3.6": lambda: blur(3.6),
+    "blur-20": lambda: blur(20.0),
+    "noise": noise,
+    "nucleus": nucleus,
+    "cytoskeleton": cytoskeleton,
+    "perlin": perlin,
+    "gibson-lanni": gibson_lanni,
 }
 
 
@@ -123,6 +139,6 @@ for line in sys.stdin:
     try:
         if name not in known:
             known[name] = warm(name)
-        print(json.dumps({'work': name, 'cpu_s': measure(*known[name], float(seconds))}), flush=True)
+        print(json.dumps({"work": name, "cpu_s": measure(*known[name], float(seconds))}), flush=True)
     except ImportError as error:
-        print(json.dumps({'work': name, 'missing': str(error)}), flush=True)
+        print(json.dumps({"work": name, "missing": str(error)}), flush=True)

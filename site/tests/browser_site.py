@@ -10,8 +10,15 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "xtask/python"))
 from chromium import Browser  # noqa: E402
 
 SHOWN = [
-    "index", "start", "gallery/presets", "gallery/debris", "physics/optics", "recipe/optics", "recipe/index",
-    "how-to/microscope", "properties/performance",
+    "index",
+    "start",
+    "gallery/presets",
+    "gallery/debris",
+    "physics/optics",
+    "recipe/optics",
+    "recipe/index",
+    "how-to/microscope",
+    "properties/performance",
 ]
 
 
@@ -52,7 +59,9 @@ def main(chromium, site, pictures):
     browser.until("document.querySelectorAll('#found a').length > 0")
     browser.picture(pictures / "search.png")
     browser.run("document.querySelector('#found a').click()")
-    browser.until("location.href.endsWith('recipe/optics.html#optics.condenser_na')", lambda: browser.run("location.href"))
+    browser.until(
+        "location.href.endsWith('recipe/optics.html#optics.condenser_na')", lambda: browser.run("location.href")
+    )
 
     browser.check("file:")
     browser.close()

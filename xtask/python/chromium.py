@@ -15,9 +15,20 @@ import time
 
 PATIENCE_S = 30
 FLAGS = [
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--disable-extensions", "--disable-dev-shm-usage", "--hide-scrollbars",
-    "--no-default-browser-check", "--window-size=1280,800", "--remote-debugging-pipe",
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-extensions",
+    "--disable-dev-shm-usage",
+    "--hide-scrollbars",
+    "--no-default-browser-check",
+    "--window-size=1280,800",
+    "--remote-debugging-pipe",
 ]
 
 
@@ -60,7 +71,9 @@ class Browser:
         shell = f'exec "$@" 3<&{theirs_in} 4>&{theirs_out}'
         self.process = subprocess.Popen(
             ["sh", "-c", shell, "sh", chromium, *FLAGS, f"--user-data-dir={self.profile}", "about:blank"],
-            pass_fds=(theirs_in, theirs_out), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            pass_fds=(theirs_in, theirs_out),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
         )
         os.close(theirs_in)
         os.close(theirs_out)
@@ -113,7 +126,12 @@ class Browser:
         raise SystemExit(f"waited for {condition}; {otherwise()}")
 
     def press(self, key):
-        codes = {" ": ("Space", 32), "Tab": ("Tab", 9), "ArrowLeft": ("ArrowLeft", 37), "ArrowRight": ("ArrowRight", 39)}
+        codes = {
+            " ": ("Space", 32),
+            "Tab": ("Tab", 9),
+            "ArrowLeft": ("ArrowLeft", 37),
+            "ArrowRight": ("ArrowRight", 39),
+        }
         code, number = codes.get(key, (f"Key{key.upper()}", ord(key.upper()[0])))
         fields = {"key": key, "code": code, "windowsVirtualKeyCode": number}
         text = {"text": key} if len(key) == 1 else {}
@@ -128,7 +146,9 @@ class Browser:
             self.call("Input.dispatchMouseEvent", type=kind, x=box[0], y=box[1], button="left", clickCount=1)
 
     def wheel(self, x, y, turn, shift=False):
-        self.call("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=turn, modifiers=8 if shift else 0)
+        self.call(
+            "Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=turn, modifiers=8 if shift else 0
+        )
 
     def drag(self, start, end):
         """Drag with the left button from a point of the page to another."""

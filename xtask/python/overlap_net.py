@@ -28,7 +28,9 @@ from scipy.optimize import linear_sum_assignment
 
 FINE_UM = 0.5  # pixel size of the light that the networks see; masks and heat maps have pixels of 1 µm
 MATCH = 0.7  # smallest Dice coefficient of a cell that is found
-FINDER = dict(side=128, batch=8, fold=4, channels=(24, 48, 64))  # side in µm; light is folded into channels of the first level
+FINDER = dict(
+    side=128, batch=8, fold=4, channels=(24, 48, 64)
+)  # side in µm; light is folded into channels of the first level
 OUTLINER = dict(side=112, batch=16, fold=4, channels=(32, 64, 96, 128))
 SPOT_UM = 2.5  # standard deviation of the spots at the centres of nuclei
 PEAK = 0.4  # smallest height of a detected centre, relative to that of a spot
@@ -73,7 +75,9 @@ def load(name, limit=None):
                 return fields
             full = image["height"], image["width"]
             size = tuple(round(side * image["pixel_um"]) for side in full)
-            light = resized(normalized(Image.open(Path(path) / image["file_name"])), [round(side / FINE_UM) for side in size])
+            light = resized(
+                normalized(Image.open(Path(path) / image["file_name"])), [round(side / FINE_UM) for side in size]
+            )
             objects = [a for a in shard["annotations"] if a["image_id"] == image["id"]]
             nuclei = {a["object_id"]: a for a in objects if a["part"] == "nucleus"}
             cells = [a for a in objects if a["part"] == "cytoplasm" and a["object_id"] in nuclei]
@@ -136,7 +140,9 @@ def network(kind, maps):
 
     def block(x, channels):
         for _ in range(2):
-            x = layers.ReLU()(layers.BatchNormalization()(layers.Conv2D(channels, 3, padding="same", use_bias=False)(x)))
+            x = layers.ReLU()(
+                layers.BatchNormalization()(layers.Conv2D(channels, 3, padding="same", use_bias=False)(x))
+            )
         return x
 
     factor = round(kind["fold"] * FINE_UM)
@@ -151,7 +157,9 @@ def network(kind, maps):
         x = layers.Conv2D(channels, 3, padding="same")(layers.UpSampling2D()(x))
         x = block(layers.Concatenate()([x, skip]), channels)
     x = layers.Conv2D(factor**2, 1)(x)
-    return tf.keras.Model(start, tf.keras.layers.Lambda(lambda y: tf.nn.depth_to_space(y, factor))(x) if factor > 1 else x)
+    return tf.keras.Model(
+        start, tf.keras.layers.Lambda(lambda y: tf.nn.depth_to_space(y, factor))(x) if factor > 1 else x
+    )
 
 
 def altered(light, rng):
@@ -207,7 +215,9 @@ def outliner_example(fields, rng):
 def train(net, kind, example, sets, steps, seed, dice):
     """Train a network on batches of which each set gives an equal part."""
     rng = np.random.default_rng(seed)
-    optimizer = tf.keras.optimizers.AdamW(tf.keras.optimizers.schedules.CosineDecay(2e-3, steps, warmup_target=2e-3), weight_decay=1e-4)
+    optimizer = tf.keras.optimizers.AdamW(
+        tf.keras.optimizers.schedules.CosineDecay(2e-3, steps, warmup_target=2e-3), weight_decay=1e-4
+    )
 
     @tf.function(autograph=False)
     def step(images, targets, weights):
@@ -275,7 +285,9 @@ def outlines(outliner, field, centres):
         light = window(field["light"], corner, side, OUTSIDE, fine)
         maps = [spots([centres[own]], corner, side), spots(np.delete(centres, own, axis=0), corner, side)]
         ways = [(turns, mirror) for turns in TURNS for mirror in (1, -1)]
-        batch = [inputs(np.rot90(light[::m], t), [np.rot90(v[::m], t) for v in maps], OUTLINER["fold"]) for t, m in ways]
+        batch = [
+            inputs(np.rot90(light[::m], t), [np.rot90(v[::m], t) for v in maps], OUTLINER["fold"]) for t, m in ways
+        ]
         views = zip(probability(outliner, batch), ways)
         found.append((corner, np.mean([np.rot90(v, -t)[::m] for v, (t, m) in views], 0)))
     return found
@@ -292,7 +304,9 @@ def cells(found, field):
         whole = np.zeros(field["size"], np.float32)
         low = [max(c, 0) for c in corner]
         high = [min(c + n, m) for c, n, m in zip(corner, part.shape, field["size"])]
-        whole[low[0] : high[0], low[1] : high[1]] = part[tuple(slice(a - c, b - c) for a, b, c in zip(low, high, corner))]
+        whole[low[0] : high[0], low[1] : high[1]] = part[
+            tuple(slice(a - c, b - c) for a, b, c in zip(low, high, corner))
+        ]
         mask = whole > COVERED
         if all((mask & other).sum() <= SAME * (mask | other).sum() for other in kept):
             kept.append(mask)
@@ -338,7 +352,12 @@ def main():
     if options.weights:
         finder.save_weights(f"{options.weights}-finder.weights.h5")
         outliner.save_weights(f"{options.weights}-outliner.weights.h5")
-    result = {"train": options.train, "steps": options.steps, "seed": options.seed, "tests": {name: [] for name in options.test}}
+    result = {
+        "train": options.train,
+        "steps": options.steps,
+        "seed": options.seed,
+        "tests": {name: [] for name in options.test},
+    }
     for name, scores in result["tests"].items():
         for field in load(name):
             masks = cells(outlines(outliner, field, peaks(heat(finder, field))), field)

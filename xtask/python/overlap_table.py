@@ -33,10 +33,19 @@ def main():
     print("---|" * 6 + "---")
     for test, fields in tests.items():
         rng, fields = np.random.default_rng(0), list(fields.values())
-        draws = [measures([f for i in rng.integers(len(fields), size=len(fields)) for f in fields[i]]) for _ in range(DRAWS)]
+        draws = [
+            measures([f for i in rng.integers(len(fields), size=len(fields)) for f in fields[i]]) for _ in range(DRAWS)
+        ]
         means = measures([f for field in fields for f in field])
-        parts = [f"{mean:.3f} ({low:.3f} to {high:.3f})" for mean, low, high in zip(means, *np.quantile(draws, (0.025, 0.975), axis=0))]
-        print(" | ".join([test, str(trainings), str(len(fields)), str(sum(field[0]["cells"] for field in fields)), *parts]))
+        parts = [
+            f"{mean:.3f} ({low:.3f} to {high:.3f})"
+            for mean, low, high in zip(means, *np.quantile(draws, (0.025, 0.975), axis=0))
+        ]
+        print(
+            " | ".join(
+                [test, str(trainings), str(len(fields)), str(sum(field[0]["cells"] for field in fields)), *parts]
+            )
+        )
 
 
 if __name__ == "__main__":

@@ -88,7 +88,16 @@ def main():
     grey = np.asarray(Image.open(arguments.image).convert("L"), dtype=np.float32)
     true = np.asarray(Image.open(arguments.mask).convert("L")) > 0
     real = dice(probability(grey) >= threshold, true)
-    print(json.dumps({"fields": seen, "threshold": round(float(threshold), 3), "dice_synthetic": round(float(scores.max()), 3), "dice_real": round(real, 3)}))
+    print(
+        json.dumps(
+            {
+                "fields": seen,
+                "threshold": round(float(threshold), 3),
+                "dice_synthetic": round(float(scores.max()), 3),
+                "dice_real": round(real, 3),
+            }
+        )
+    )
 
 
 if __name__ == "__main__":

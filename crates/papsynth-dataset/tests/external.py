@@ -112,7 +112,11 @@ def check_stack(path, frame):
     equal(f"type of {path}", stack.dtype, np.dtype("u1" if frame["bits"] <= 8 else "u2"))
     pixels = tifffile.xml2dict(description)["OME"]["Image"]["Pixels"]
     step = abs(frame["planes_um"][1] - frame["planes_um"][0])
-    for key, value in [("PhysicalSizeX", frame["pixel_um"]), ("PhysicalSizeY", frame["pixel_um"]), ("PhysicalSizeZ", step)]:
+    for key, value in [
+        ("PhysicalSizeX", frame["pixel_um"]),
+        ("PhysicalSizeY", frame["pixel_um"]),
+        ("PhysicalSizeZ", step),
+    ]:
         check(abs(float(pixels[key]) - value) < 1e-9, f"{key} of {path}: found {pixels[key]}, expected {value}")
         equal(f"{key}Unit of {path}", pixels[f"{key}Unit"], "µm")
     if ome_types is not None:
@@ -249,7 +253,11 @@ def main(folder):
     for frame in (frame for record in records for frame in record["frames"]):
         image = coco.imgs[frame["index"]]
         saturated = [int(rle.area(mask)) for mask in image.get("saturated", [])]
-        equal(f"saturated pixels of frame {frame['index']}", saturated or [0] * len(frame["planes_um"]), frame["saturated_px"])
+        equal(
+            f"saturated pixels of frame {frame['index']}",
+            saturated or [0] * len(frame["planes_um"]),
+            frame["saturated_px"],
+        )
         check((folder / image["file_name"]).exists(), f"{image['file_name']} is missing")
         equal(f"size of frame {frame['index']}", [image["width"], image["height"]], [frame["width"], frame["height"]])
         labels = check_images(folder, frame)

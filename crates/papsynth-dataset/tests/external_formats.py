@@ -26,12 +26,11 @@ import ome_types
 import shapely
 import tifffile
 import webdataset
+from external import GROUPS, check, check_manifest, equal, passed, read_json
 from PIL import Image
 from pycocotools import mask as rle
 from pycocotools.coco import COCO
 from shapely.geometry import shape
-
-from external import GROUPS, check, check_manifest, equal, passed, read_json
 
 # Groups of the formats for segmenters.
 FLAT = ["cytoplasm", "nucleus"]
@@ -144,7 +143,9 @@ def check_truth(folder, records):
             masks = sum(int(one.mask.sum()) for one in frame.of(group))
             occluded = masks - int(np.count_nonzero(frame.labels(group, frame.policy)))
             equal(f"occluded pixels of {group} in frame {frame.index}", frame.summary["occluded_px"][group], occluded)
-    passed(f"shards/*.coco.json: pycocotools reads every mask, area and box of {objects} objects in {len(frames)} frames")
+    passed(
+        f"shards/*.coco.json: pycocotools reads every mask, area and box of {objects} objects in {len(frames)} frames"
+    )
     return frames
 
 
@@ -209,7 +210,9 @@ def check_folder(frames):
             same(str(path), tifffile.imread(path).astype(np.int64), frame.labels(group, "top"))
             same(f"{path} by Pillow", np.array(Image.open(path)).astype(np.int64), frame.labels(group, "top"))
         layers = sum((one.mask.astype(int) for one in frame.of("cytoplasm")), np.zeros(frame.shape, int))
-        same(f"layers of frame {frame.index}", tifffile.imread(frame.folder / f"labels/layers/{frame.name}.tif"), layers)
+        same(
+            f"layers of frame {frame.index}", tifffile.imread(frame.folder / f"labels/layers/{frame.name}.tif"), layers
+        )
     passed(f"folder: Pillow, libpng and tifffile agree on images and labels of {len(frames)} frames")
 
 
@@ -235,7 +238,9 @@ def check_ome(path, frame, planes, channels):
         equal(f"physical size {key} of {path}", getattr(typed, f"physical_size_{key}"), frame.summary["pixel_um"])
         equal(f"unit of {key} of {path}", getattr(typed, f"physical_size_{key}_unit").value, "µm")
     equal(f"samples of {path}", sum(channel.samples_per_pixel for channel in typed.channels), channels)
-    expected_axes = ("Z" if planes > 1 else "") + ("C" if channels > 1 and not colour else "") + "YX" + ("S" if colour else "")
+    expected_axes = (
+        ("Z" if planes > 1 else "") + ("C" if channels > 1 and not colour else "") + "YX" + ("S" if colour else "")
+    )
     equal(f"axes of {path}", axes, expected_axes)
     return pixels, typed
 
@@ -269,7 +274,9 @@ def check_ome_tiff(frames):
                     equal(f"area of {one.name} in {path}", area, int(rle.area(one.annotation["segmentation"])))
             known = {one.id for one in frame.of(group)} | {0}
             check(set(np.unique(pixels).tolist()) <= known, f"{path} has unknown objects")
-    passed(f"ome-tiff: schema, axes, µm and pixels of {len(frames)} images; {layers} label layers have every complete mask")
+    passed(
+        f"ome-tiff: schema, axes, µm and pixels of {len(frames)} images; {layers} label layers have every complete mask"
+    )
 
 
 def keep(key, data):
@@ -317,7 +324,9 @@ def check_webdataset(folder, frames, records, splits):
         own = next(iter(webdataset.WebDataset(urls, shardshuffle=False).decode("rgb8")))
         picture = frames[0].at_8_bits(frames[0].picture())
         same("png by webdataset's own decoder", own["png"], picture if frames[0].colour else np.dstack([picture] * 3))
-    passed(f"webdataset: {len(samples)} samples in {len(urls)} tar files, pixels, labels and ground truth as in other formats")
+    passed(
+        f"webdataset: {len(samples)} samples in {len(urls)} tar files, pixels, labels and ground truth as in other formats"
+    )
 
 
 def check_pairs(what, frame, group, image, masks):
@@ -391,7 +400,11 @@ def check_yolo(folder, frames, splits, categories):
     lines = 0
     for frame in frames:
         place = f"{splits[frame.index]['by_slide']}/{frame.name}"
-        same(f"image {place}", imagecodecs.png_decode((here / f"images/{place}.png").read_bytes()), frame.at_8_bits(frame.picture()))
+        same(
+            f"image {place}",
+            imagecodecs.png_decode((here / f"images/{place}.png").read_bytes()),
+            frame.at_8_bits(frame.picture()),
+        )
         rows = [line.split() for line in (here / f"labels/{place}.txt").read_text().splitlines()]
         shown = [one for one in frame.objects if one.mask.any()]
         equal(f"lines of {place}", len(rows), len(shown))
@@ -440,7 +453,9 @@ def check_qupath(folder, frames):
             ids[str(uuid.UUID(feature["id"]))] += 1
             number, properties = int(feature["properties"]["name"]), feature["properties"]
             cell = properties["objectType"] == "cell"
-            check(properties["objectType"] in ("cell", "detection"), f"{properties['objectType']} is not a type of QuPath")
+            check(
+                properties["objectType"] in ("cell", "detection"), f"{properties['objectType']} is not a type of QuPath"
+            )
             parts = ["cytoplasm"] if cell else ["nucleus", "debris"]
             one = next(by_id[number, part] for part in parts if (number, part) in left)
             left.remove((one.id, one.group))
@@ -456,7 +471,10 @@ def check_qupath(folder, frames):
                 left.discard((nucleus.id, "nucleus"))
                 inner = check_geometry(feature["nucleusGeometry"], nucleus, frame.shape)
                 outer = shapely.box(*form.bounds)
-                check(outer.covers(inner), f"{nucleus.name} is outside the bounds of its cell: {inner.bounds}, {form.bounds}")
+                check(
+                    outer.covers(inner),
+                    f"{nucleus.name} is outside the bounds of its cell: {inner.bounds}, {form.bounds}",
+                )
         equal(f"objects of frame {frame.index} without a feature", sorted(left), [])
     equal("names of several features", [name for name, count in ids.items() if count > 1], [])
     passed(f"qupath: {len(ids)} features with valid polygons equal to their masks, {nuclei} nuclei within their cells")

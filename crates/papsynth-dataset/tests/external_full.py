@@ -25,11 +25,10 @@ import mlcroissant
 import numpy as np
 import pyarrow.parquet as pq
 import tifffile
-from PIL import Image
-from pycocotools import mask as rle
-
 from external import check, check_manifest, equal, passed
 from external_formats import check_truth, same
+from PIL import Image
+from pycocotools import mask as rle
 
 
 def check_croissant(folder, frames):
@@ -48,7 +47,11 @@ def check_croissant(folder, frames):
     rows = sorted(dataset.records(record_set="frames"), key=lambda row: row["frames/index"])
     sizes = [(row["frames/index"], row["frames/height"], row["frames/width"]) for row in rows]
     equal("rows of frames", sizes, [(frame.index, *frame.shape) for frame in frames])
-    sets = {entry["@id"] for entry in json.loads((folder / "croissant.json").read_text())["distribution"] if entry["@type"] == "cr:FileSet"}
+    sets = {
+        entry["@id"]
+        for entry in json.loads((folder / "croissant.json").read_text())["distribution"]
+        if entry["@type"] == "cr:FileSet"
+    }
     check({"webdataset", "huggingface"} <= sets, f"croissant.json has the sets {sets}")
     with tempfile.TemporaryDirectory() as copy:
         for name in ["croissant.json", "splits.csv"]:
@@ -100,7 +103,10 @@ def check_tables(folder, frames, records):
                     equal(f"{key} in {name}.parquet", value, type(value)(text) if value is not None else text or None)
             one = by_place[found["image"], found["id"], found["part"]]
             size = [found["image_height_px"], found["image_width_px"]]
-            for key, area, written in [("rle", "area_px", "segmentation"), ("visible_rle", "visible_area_px", "visible")]:
+            for key, area, written in [
+                ("rle", "area_px", "segmentation"),
+                ("visible_rle", "visible_area_px", "visible"),
+            ]:
                 counts = one.annotation[written]["counts"]
                 counts = counts.decode() if isinstance(counts, bytes) else counts
                 equal(f"{key} of {one.name} in {name}.parquet", found[key], counts)
@@ -128,13 +134,18 @@ def check_huggingface(folder, frames, categories, splits):
         for data in ways:
             equal("splits of datasets", {name: part["index"] for name, part in data.items()}, expected)
             for name, part in data.items():
-                check(isinstance(part.features["image"], datasets.Image), f"the image of {name} is {part.features['image']}")
+                check(
+                    isinstance(part.features["image"], datasets.Image),
+                    f"the image of {name} is {part.features['image']}",
+                )
                 classes = part.features["objects"].feature["category"].names
                 equal(f"classes of {name}", classes, [category["name"] for category in categories])
                 raw = part.cast_column("image", datasets.Image(decode=False))
                 for row, bare in zip(part, raw):
                     check_row(row, bare, by_index[row["index"]], categories)
-    passed(f"huggingface: datasets reads {len(frames)} frames in {len(expected)} splits, pixels, areas and run lengths as in other formats")
+    passed(
+        f"huggingface: datasets reads {len(frames)} frames in {len(expected)} splits, pixels, areas and run lengths as in other formats"
+    )
 
 
 def check_row(row, bare, frame, categories):
@@ -152,7 +163,18 @@ def check_row(row, bare, frame, categories):
     equal(f"objects of {what}", len(row["objects"]), len(frame.objects))
     for found, one in zip(row["objects"], frame.objects):
         annotation = one.annotation
-        keys = ["part", "kind", "class", "bethesda", "traits", "semantic_class", "cluster", "bbox", "area", "visible_area"]
+        keys = [
+            "part",
+            "kind",
+            "class",
+            "bethesda",
+            "traits",
+            "semantic_class",
+            "cluster",
+            "bbox",
+            "area",
+            "visible_area",
+        ]
         keys += ["area_um2", "depth_um", "mean_absorbance", "tint", "truncated"]
         for key in keys:
             equal(f"{key} of {one.name} in {what}", found[key], annotation[key])
@@ -161,7 +183,9 @@ def check_row(row, bare, frame, categories):
         equal(f"category of {one.name}", categories[found["category"]]["id"], annotation["category_id"])
         for key, written in [("rle", "segmentation"), ("visible_rle", "visible")]:
             counts = annotation[written]["counts"]
-            equal(f"{key} of {one.name} in {what}", found[key], counts.decode() if isinstance(counts, bytes) else counts)
+            equal(
+                f"{key} of {one.name} in {what}", found[key], counts.decode() if isinstance(counts, bytes) else counts
+            )
         area = int(rle.area({"size": list(frame.shape), "counts": found["rle"]}))
         equal(f"area of {one.name} in {what}", area, annotation["area"])
 
@@ -187,7 +211,9 @@ def check_opencv(folder, frames):
 
 def check_bio_formats(folder, frames, jar):
     """Converts every OME-TIFF with Bio-Formats and compares the result."""
-    paths = sorted([*folder.glob("ome-tiff/*.ome.tif"), *folder.glob("qupath/*.ome.tif"), *folder.glob("images/*.ome.tif")])
+    paths = sorted(
+        [*folder.glob("ome-tiff/*.ome.tif"), *folder.glob("qupath/*.ome.tif"), *folder.glob("images/*.ome.tif")]
+    )
     with tempfile.TemporaryDirectory() as out:
         for number, path in enumerate(paths):
             again = Path(out) / f"{number}.ome.tif"
@@ -200,7 +226,16 @@ def check_bio_formats(folder, frames, jar):
                 found = np.moveaxis(found, -3, -1) if expected.shape[-1] == 3 else found
             same(f"{path} by Bio-Formats", found.reshape(expected.shape), expected)
             with tifffile.TiffFile(path) as source, tifffile.TiffFile(again) as copy:
-                for key in ["SizeX", "SizeY", "SizeZ", "SizeC", "SizeT", "PhysicalSizeX", "PhysicalSizeY", "PhysicalSizeZ"]:
+                for key in [
+                    "SizeX",
+                    "SizeY",
+                    "SizeZ",
+                    "SizeC",
+                    "SizeT",
+                    "PhysicalSizeX",
+                    "PhysicalSizeY",
+                    "PhysicalSizeZ",
+                ]:
                     values = [re.search(rf' {key}="([^"]*)"', file.ome_metadata) for file in (source, copy)]
                     values = [value and float(value[1]) for value in values]
                     equal(f"{key} of {path} by Bio-Formats", values[1], values[0])

@@ -15,11 +15,10 @@ import numpy as np
 import pyarrow.dataset
 import tensorstore
 import zarr
+from external import check, passed
 from ome_zarr_models.v05.image import Image
 from pycocotools import mask as coco
 from shapely.geometry import shape
-
-from external import check, passed
 
 csv.field_size_limit(1 << 28)
 

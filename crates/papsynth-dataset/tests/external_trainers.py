@@ -14,7 +14,6 @@ from unittest.mock import MagicMock
 
 import numpy as np
 import tifffile
-
 from external import check, passed
 
 warnings.filterwarnings("ignore")
@@ -45,7 +44,9 @@ from stardist.geometry import star_dist  # noqa: E402
 
 
 def same(read, path, what):
-    check(np.array_equal(np.squeeze(read), np.squeeze(tifffile.imread(path))), f"{what}: {path} is read without changes")
+    check(
+        np.array_equal(np.squeeze(read), np.squeeze(tifffile.imread(path))), f"{what}: {path} is read without changes"
+    )
 
 
 def read_cellpose(folder):
@@ -72,7 +73,10 @@ def read_stardist(folder):
     for (_, mask, _, _), expected in zip(found, masks):
         check(np.array_equal(mask, expected), f"CSBDeep reads the masks of {folder} without changes")
         # StarDist learns the distances from each pixel of an object to its border.
-        check(np.array_equal(star_dist(mask.astype(np.uint16), 8).max(axis=-1) > 0, mask > 0), "StarDist sees every object")
+        check(
+            np.array_equal(star_dist(mask.astype(np.uint16), 8).max(axis=-1) > 0, mask > 0),
+            "StarDist sees every object",
+        )
     return len(files)
 
 

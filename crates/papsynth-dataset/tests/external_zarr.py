@@ -17,14 +17,13 @@ from pathlib import Path
 import numpy as np
 import tensorstore
 import zarr
+from external import GROUPS, check, check_manifest, equal, passed
+from external_formats import check_truth, same
 from napari_ome_zarr import napari_get_reader
 from ome_zarr.io import parse_url
 from ome_zarr.reader import Reader
 from ome_zarr_models.v05.image import Image
 from ome_zarr_models.v05.image_label import ImageLabel
-
-from external import GROUPS, check, check_manifest, equal, passed
-from external_formats import check_truth, same
 
 
 def half(values):
@@ -67,7 +66,9 @@ def check_zarr(frames):
             image = half(image).astype(image.dtype)
             arrays += 1
         longer = max(frame.shape)
-        equal(f"levels of {path}", len(levels_of(group)), 1 if longer < 2048 else 1 + int(np.ceil(np.log2(longer / 512))))
+        equal(
+            f"levels of {path}", len(levels_of(group)), 1 if longer < 2048 else 1 + int(np.ceil(np.log2(longer / 512)))
+        )
         shown = {part: [] for part in GROUPS.values()}
         names = group["labels"].attrs["ome"]["labels"]
         for name in names:
@@ -77,7 +78,11 @@ def check_zarr(frames):
             for number, level in enumerate(levels_of(labels)):
                 same(f"level {level} of labels {name} of {path}", labels[level][:], full[:: 2**number, :: 2**number])
             known = labels.attrs["ome"]["image-label"].get("properties", [])
-            equal(f"labels {name} of {path} with properties", {row["label-value"] for row in known}, set(np.unique(full).tolist()) - {0})
+            equal(
+                f"labels {name} of {path} with properties",
+                {row["label-value"] for row in known},
+                set(np.unique(full).tolist()) - {0},
+            )
             shown[name.rsplit("-", 1)[0]].append((full, {row["label-value"]: row for row in known}))
             layers += 1
         for one in frame.objects:
@@ -89,11 +94,17 @@ def check_zarr(frames):
                 equal(f"area of {one.name} in {path}", [row["area_px"], int(mask.sum())], [annotation["area"]] * 2)
                 for key in ["class", "bethesda", "kind", "depth_um", "mean_absorbance", "area_um2", "truncated"]:
                     equal(f"{key} of {one.name} in {path}", row[key], annotation[key])
-                equal(f"category of {one.name} in {path}", row["category"], frame.coco.cats[annotation["category_id"]]["name"])
+                equal(
+                    f"category of {one.name} in {path}",
+                    row["category"],
+                    frame.coco.cats[annotation["category_id"]]["name"],
+                )
                 parent = annotation["parent_id"] and frame.coco.anns[annotation["parent_id"]]["object_id"]
                 equal(f"parent of {one.name} in {path}", row["parent"], parent)
                 objects += 1
-    passed(f"ome-zarr: zarr-python and tensorstore read {arrays} levels pixel by pixel, {layers} label layers have {objects} complete masks")
+    passed(
+        f"ome-zarr: zarr-python and tensorstore read {arrays} levels pixel by pixel, {layers} label layers have {objects} complete masks"
+    )
 
 
 def check_models(frames):

@@ -56,13 +56,17 @@ def deaths_in(folder):
 
 def is_progress(reports):
     whole = [count for count, _ in reports]
-    return len(whole) > 2 and whole == sorted(set(whole)) and whole[-1] == FRAMES and {total for _, total in reports} == {FRAMES}
+    return (
+        len(whole) > 2
+        and whole == sorted(set(whole))
+        and whole[-1] == FRAMES
+        and {total for _, total in reports} == {FRAMES}
+    )
 
 
 def with_ray(folder, expected):
-    import ray
-
     import papsynth.ray
+    import ray
 
     # Workers import packages from here and receive tasks by value.
     ray.init(num_cpus=2, include_dashboard=False, logging_level="error")
@@ -81,21 +85,29 @@ def with_ray(folder, expected):
 
 
 def with_dask(folder, expected):
-    from dask.distributed import Client, LocalCluster
-
-    import papsynth.dask
-
     # Allow tasks to kill several workers.
     import dask
+    import papsynth.dask
+    from dask.distributed import Client, LocalCluster
 
     dask.config.set({"distributed.scheduler.allowed-failures": 20})
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
         papsynth.dask._task = dying(8, after=True)
         told = []
         root = papsynth.dask.generate(
-            RECIPE, folder / "set", FRAMES, SEED, client=client, tasks=TASKS, progress=lambda *counts: told.append(counts), **WORDS
+            RECIPE,
+            folder / "set",
+            FRAMES,
+            SEED,
+            client=client,
+            tasks=TASKS,
+            progress=lambda *counts: told.append(counts),
+            **WORDS,
         )
-    check(deaths_in(folder) == 8 and root == expected, f"Dask: the same root hash with 8 workers killed after the write: {root}")
+    check(
+        deaths_in(folder) == 8 and root == expected,
+        f"Dask: the same root hash with 8 workers killed after the write: {root}",
+    )
     check(is_progress(told), "Dask: progress is reported from commit records")
     killed_driver("dask", folder, expected)
 
@@ -109,7 +121,9 @@ if __name__ == "__main__":
 """
     (folder / "driver.py").write_text(script)
     words = [sys.executable, str(folder / "driver.py")]
-    driver = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, start_new_session=True)
+    driver = subprocess.Popen(
+        words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, start_new_session=True
+    )
     while driver.poll() is None and len(list(out.glob("shards/*.json"))) < FRAMES // 4:
         time.sleep(0.05)
     check(driver.poll() is None, f"{engine}: the driver is killed during the run")

@@ -19,8 +19,18 @@ from pathlib import Path
 
 FRAMES, SEED, TASKS = 60, 7, 20
 WORDS = [
-    "--frames", str(FRAMES), "--seed", str(SEED), "--format", "folder,webdataset", "--frames-per-shard", "1",
-    "--set", "field.width_px=320", "--set", "field.height_px=240",
+    "--frames",
+    str(FRAMES),
+    "--seed",
+    str(SEED),
+    "--format",
+    "folder,webdataset",
+    "--frames-per-shard",
+    "1",
+    "--set",
+    "field.width_px=320",
+    "--set",
+    "field.height_px=240",
 ]
 
 
@@ -80,8 +90,19 @@ PartitionName=main Nodes={host} Default=YES MaxTime=INFINITE State=UP
 """)
         self.host = host
         self.environment = {**os.environ, "SLURM_CONF": str(folder / "slurm.conf")}
-        self.start("munged", ["munged", "--foreground", "--force", f"--key-file={key}", f"--socket={self.socket}",
-                              f"--pid-file={folder}/munge/pid", f"--log-file={folder}/munge/log", f"--seed-file={folder}/munge/seed"])
+        self.start(
+            "munged",
+            [
+                "munged",
+                "--foreground",
+                "--force",
+                f"--key-file={key}",
+                f"--socket={self.socket}",
+                f"--pid-file={folder}/munge/pid",
+                f"--log-file={folder}/munge/log",
+                f"--seed-file={folder}/munge/seed",
+            ],
+        )
         self.until(self.socket.exists, "munged listens")
         self.start("slurmctld", ["slurmctld", "-D", "-i"])
         self.until(lambda: self.run("scontrol", "ping", check=False).returncode == 0, "slurmctld answers")
@@ -90,7 +111,9 @@ PartitionName=main Nodes={host} Default=YES MaxTime=INFINITE State=UP
 
     def start(self, name, words):
         with (self.folder / f"{name}.out").open("ab") as out:
-            self.processes[name] = subprocess.Popen(words, env=self.environment, stdout=out, stderr=out, start_new_session=True)
+            self.processes[name] = subprocess.Popen(
+                words, env=self.environment, stdout=out, stderr=out, start_new_session=True
+            )
 
     def run(self, *words, check=True):
         return subprocess.run(words, env=self.environment, capture_output=True, text=True, check=check)
@@ -127,7 +150,20 @@ def main(program, folder, root):
     # The package is built without Parquet.
     told = subprocess.run([program, "generate", "--help"], capture_output=True, text=True, check=True).stdout
     own_words = [*WORDS, "--no-parquet"] if "--no-parquet" in told else WORDS
-    words = [program, "submit", "slurm", "--tasks", str(TASKS), "--threads", "1", "--", "--out", str(out), "--quiet", *own_words]
+    words = [
+        program,
+        "submit",
+        "slurm",
+        "--tasks",
+        str(TASKS),
+        "--threads",
+        "1",
+        "--",
+        "--out",
+        str(out),
+        "--quiet",
+        *own_words,
+    ]
     text = subprocess.run(words, capture_output=True, text=True, check=True).stdout
     script.write_text(text.replace("papsynth generate", f"{program} generate", 1))
     # munge requires a socket folder that only its owner can write.
@@ -158,15 +194,22 @@ def main(program, folder, root):
             if any(word in slurm.run("sinfo", "-h", "-o", "%t").stdout for word in ("down", "drain")):
                 slurm.run("scontrol", "update", f"NodeName={slurm.host}", "State=RESUME", check=False)
             time.sleep(0.3)
-        check(requeued >= 6 and killed == 1, f"Slurm: job {job}, {requeued} tasks requeued, the daemon killed {killed} times")
+        check(
+            requeued >= 6 and killed == 1,
+            f"Slurm: job {job}, {requeued} tasks requeued, the daemon killed {killed} times",
+        )
     finally:
         if slurm is not None:
             slurm.end()
         shutil.rmtree(own, ignore_errors=True)
-    left = subprocess.run([program, "status", out, "--frames", str(FRAMES), "--missing"], capture_output=True, text=True, check=True)
+    left = subprocess.run(
+        [program, "status", out, "--frames", str(FRAMES), "--missing"], capture_output=True, text=True, check=True
+    )
     check(left.stdout.strip() == "", f"Slurm: missing shards: {left.stdout.strip()}")
     subprocess.run([program, "merge", out, "--frames", str(FRAMES)], check=True, stdout=subprocess.DEVNULL)
-    told = subprocess.run([program, "verify", out, "--frames", str(FRAMES)], capture_output=True, text=True, check=True).stdout
+    told = subprocess.run(
+        [program, "verify", out, "--frames", str(FRAMES)], capture_output=True, text=True, check=True
+    ).stdout
     check(root in told, f"Slurm: the same root hash {root}")
 
 

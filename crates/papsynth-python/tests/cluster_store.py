@@ -20,9 +20,8 @@ import time
 from pathlib import Path
 
 import boto3
-from moto.server import ThreadedMotoServer
-
 import papsynth
+from moto.server import ThreadedMotoServer
 
 RECIPE = {"field": {"width_px": 320, "height_px": 240}}
 FRAMES, SEED = 60, 7
@@ -113,7 +112,11 @@ def main(program, folder):
     temporary.mkdir(parents=True)
     papsynth.generate(RECIPE, folder / "alone", FRAMES, SEED, **WORDS)
     expected = papsynth.merge(folder / "alone", FRAMES)
-    files = {str(path.relative_to(folder / "alone")): path.read_bytes() for path in (folder / "alone").rglob("*") if path.is_file()}
+    files = {
+        str(path.relative_to(folder / "alone")): path.read_bytes()
+        for path in (folder / "alone").rglob("*")
+        if path.is_file()
+    }
 
     server = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
     server.start()
@@ -152,7 +155,10 @@ def main(program, folder):
     code, told = run(program, "verify", out, "--frames", str(FRAMES))
     check(code == 0 and expected in told, f"object store: the same root hash with the program killed: {expected}")
     check(objects("killed") == files, f"its {len(files)} objects are the files of a folder")
-    check(UnreliableProxy.refused > 10 and UnreliableProxy.lost > 10, f"{UnreliableProxy.refused} requests were rejected, {UnreliableProxy.lost} replies lost")
+    check(
+        UnreliableProxy.refused > 10 and UnreliableProxy.lost > 10,
+        f"{UnreliableProxy.refused} requests were rejected, {UnreliableProxy.lost} replies lost",
+    )
 
     out = f"s3://{BUCKET}/some/where"
     papsynth.generate(RECIPE, out, FRAMES, SEED, task=(1, 2), **WORDS)
@@ -160,11 +166,17 @@ def main(program, folder):
     papsynth.generate(RECIPE, out, FRAMES, SEED, task=(0, 2), **WORDS)
     check(papsynth.merge(out, FRAMES) == expected, "Python: the same root hash in an object store")
 
-    lost = "killed/images/000007.png" if "images/000007.png" in files else f"killed/{sorted(name for name in files if '000007' in name)[0]}"
+    lost = (
+        "killed/images/000007.png"
+        if "images/000007.png" in files
+        else f"killed/{sorted(name for name in files if '000007' in name)[0]}"
+    )
     store.delete_object(Bucket=BUCKET, Key=lost)
     store.put_object(Bucket=BUCKET, Key="killed/notes.txt", Body=b"mine")
     code, told = run(program, "verify", f"s3://{BUCKET}/killed")
-    check(code == 2 and ": missing" in told and "notes.txt" in told, "verify finds a missing object and an untracked one")
+    check(
+        code == 2 and ": missing" in told and "notes.txt" in told, "verify finds a missing object and an untracked one"
+    )
     check(run(program, *generating(f"s3://{BUCKET}/killed"))[0] == 0, "the same command makes what is lost")
     code, told = run(program, "clean", f"s3://{BUCKET}/killed", "--untracked")
     check(code == 0 and objects("killed") == files, "clean removes the untracked file")

@@ -82,7 +82,9 @@ def test_bytes_are_those_of_the_command_line(tmp_path):
     for preset, words, recipe in ((None, WORDS, SMALL), ("high-grade", [], "high-grade")):
         out = tmp_path / str(preset)
         chosen = [] if preset is None else ["--preset", preset]
-        subprocess.run([PROGRAM, "generate", "--out", out, "--frames", "2", "--seed", "7", "--quiet", *chosen, *words], check=True)
+        subprocess.run(
+            [PROGRAM, "generate", "--out", out, "--frames", "2", "--seed", "7", "--quiet", *chosen, *words], check=True
+        )
         from PIL import Image
 
         for index in range(2):
@@ -106,7 +108,10 @@ def test_data_sets_have_the_root_hash_of_the_command_line(tmp_path):
 
 
 def has_parquet():
-    return "--no-parquet" in subprocess.run([PROGRAM, "generate", "--help"], capture_output=True, text=True, check=True).stdout
+    return (
+        "--no-parquet"
+        in subprocess.run([PROGRAM, "generate", "--help"], capture_output=True, text=True, check=True).stdout
+    )
 
 
 def test_scenes_of_a_data_set_reproduce_its_frames(tmp_path):
@@ -145,7 +150,13 @@ def test_data_sets_continue_and_list_missing_shards(tmp_path):
     assert [path for path, _ in papsynth.verify(tmp_path / "set")["findings"]] == ["images/000002.png"]
     with pytest.raises(ValueError, match="seed"):
         papsynth.generate(SMALL, tmp_path / "set", 4, seed=1)
-    for wrong in ({"task": (2, 2)}, {"threads": 0}, {"formats": ["jpeg"]}, {"frames_per_shard": 0}, {"without": "images"}):
+    for wrong in (
+        {"task": (2, 2)},
+        {"threads": 0},
+        {"formats": ["jpeg"]},
+        {"frames_per_shard": 0},
+        {"without": "images"},
+    ):
         with pytest.raises(ValueError):
             papsynth.generate(SMALL, tmp_path / "none", 4, **wrong)
     with pytest.raises(OSError):
@@ -257,18 +268,35 @@ def _whole(index):
 def test_frames_survive_pickling(frame):
     colour = papsynth.render({**SMALL, "light": {"kind": "colour"}, "focus": {"planes": 2}})
     with multiprocessing.get_context("spawn").Pool(1) as pool:
-        others = [(frame, pool.apply_async(_whole, (3,)).get(timeout=120)), (colour, pickle.loads(pickle.dumps(colour)))]
+        others = [
+            (frame, pool.apply_async(_whole, (3,)).get(timeout=120)),
+            (colour, pickle.loads(pickle.dumps(colour))),
+        ]
     for one, other in others:
-        assert repr(one) == repr(other) and one.planes_um == other.planes_um and one.rle == other.rle and one.visible_rle == other.visible_rle
+        assert (
+            repr(one) == repr(other)
+            and one.planes_um == other.planes_um
+            and one.rle == other.rle
+            and one.visible_rle == other.visible_rle
+        )
         for name in ("image", "stack", "noise_free", "layers", "boxes", "defocus_um", "detectability"):
             assert np.array_equal(getattr(one, name), getattr(other, name)), name
-        assert all(np.array_equal(one.table[name], other.table[name]) for name in one.table) and list(one.table) == list(other.table)
+        assert all(np.array_equal(one.table[name], other.table[name]) for name in one.table) and list(
+            one.table
+        ) == list(other.table)
     restore, state = frame.__reduce__()
-    for place, wrong in ((0, 2), (3, [frame.image[1:], frame.stack, frame.noise_free]), (2, (0.25, [0.0, 1.0], 8, [320, 240]))):
+    for place, wrong in (
+        (0, 2),
+        (3, [frame.image[1:], frame.stack, frame.noise_free]),
+        (2, (0.25, [0.0, 1.0], 8, [320, 240])),
+    ):
         with pytest.raises(ValueError, match="pickled"):
             restore(*(wrong if at == place else value for at, value in enumerate(state)))
     ids, numbers, (amodal, front), seen = state[4][0]
-    for damaged in ((ids, numbers, (amodal + "1", front), seen), ((1, "cell", *ids[2:]), numbers, (amodal, front), seen)):
+    for damaged in (
+        (ids, numbers, (amodal + "1", front), seen),
+        ((1, "cell", *ids[2:]), numbers, (amodal, front), seen),
+    ):
         with pytest.raises(ValueError, match=f"object {damaged[0][0]}"):
             restore(*state[:4], [damaged])
 
@@ -287,7 +315,9 @@ def test_an_interrupt_ends_a_render_without_partial_files(tmp_path):
         "render({'focus': {'planes': 200}, 'field': {'width_px': 600, 'height_px': 600}})",
         f"generate({SMALL!r}, {str(tmp_path / 'set')!r}, 100000)",
     ):
-        child = subprocess.Popen([sys.executable, "-c", script.format(call)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        child = subprocess.Popen(
+            [sys.executable, "-c", script.format(call)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
         assert child.stdout.readline() == "begun\n"
         threading.Event().wait(2)
         child.send_signal(2)
@@ -326,7 +356,10 @@ else:
 def test_a_recipe_is_widened_for_training():
     wide = papsynth.recipe(SMALL, widen=2.0)
     assert papsynth.recipe(SMALL, widen=1.0) == papsynth.recipe(SMALL)
-    assert wide["stain"]["field_nucleus"]["log_normal"][1] > papsynth.recipe(SMALL)["stain"]["field_nucleus"]["log_normal"][1]
+    assert (
+        wide["stain"]["field_nucleus"]["log_normal"][1]
+        > papsynth.recipe(SMALL)["stain"]["field_nucleus"]["log_normal"][1]
+    )
     assert papsynth.render(wide, seed=2).image.shape == (240, 320)
     with pytest.raises(ValueError, match="widen: 0.5 is out of range: expected 1 to 5"):
         papsynth.recipe(SMALL, widen=0.5)
@@ -342,7 +375,9 @@ def test_techniques_work_and_reject_invalid_arguments():
     model = papsynth.fsd.ShapeModel([traced * scale for scale in np.linspace(0.8, 1.2, 12)], harmonics=6)
     assert np.array_equal(model.draw(seed=3), model.draw(seed=3)) and model.draw(20.0, points=90).shape == (90, 2)
     layers = papsynth.cloth.crumple(circle, (100, 110), seed=2, vertices=200, excess=1.3)
-    assert layers.shape == (100, 110) and layers.dtype == np.float32 and abs(layers.sum() / (1.3 * mask.sum()) - 1) < 0.1
+    assert (
+        layers.shape == (100, 110) and layers.dtype == np.float32 and abs(layers.sum() / (1.3 * mask.sum()) - 1) < 0.1
+    )
     lines = papsynth.cytoskeleton.grow(circle, (100, 100), seed=2)
     assert 0 < lines.max() <= 1 and lines[0].max() == 0
     noise = papsynth.fields.perlin((64, 80), 16, seed=1)
@@ -357,7 +392,11 @@ def test_techniques_work_and_reject_invalid_arguments():
     psf = papsynth.optics.gibson_lanni([0.0, 0.5], [-1.0, 0.0, 1.0])
     assert psf.shape == (3, 2) and psf[1, 0] >= psf[1, 1]
     counts = papsynth.noise.expose(np.full((40, 50), 9000.0), seed=4)
-    assert counts.dtype == np.uint16 and counts.std() > 1 and np.array_equal(counts, papsynth.noise.expose(np.full((40, 50), 9000), seed=4))
+    assert (
+        counts.dtype == np.uint16
+        and counts.std() > 1
+        and np.array_equal(counts, papsynth.noise.expose(np.full((40, 50), 9000), seed=4))
+    )
     colour = papsynth.dyes.transmittance(eosin_y=np.full((4, 5), 0.5))
     assert colour.shape == (4, 5, 3) and colour[0, 0, 0] > colour[0, 0, 1]
     for call in (
@@ -386,15 +425,25 @@ def test_techniques_work_and_reject_invalid_arguments():
 def test_recipes_are_objects_too_which_know_every_field():
     from papsynth.recipes import CellMix, Field, OpticsBrightField, Recipe, uniform
 
-    recipe = Recipe(field=Field(width_px=320, height_px=240), optics=OpticsBrightField(na=0.9), cells={"intermediate": CellMix(count=uniform(3, 5))})
+    recipe = Recipe(
+        field=Field(width_px=320, height_px=240),
+        optics=OpticsBrightField(na=0.9),
+        cells={"intermediate": CellMix(count=uniform(3, 5))},
+    )
     plain = recipe.to_dict()
-    assert plain["optics"] == {"kind": "bright-field", "na": 0.9} and plain["cells"]["intermediate"]["count"] == {"uniform": [3, 5]}
+    assert plain["optics"] == {"kind": "bright-field", "na": 0.9} and plain["cells"]["intermediate"]["count"] == {
+        "uniform": [3, 5]
+    }
     assert np.array_equal(papsynth.render(recipe, seed=1).image, papsynth.render(plain, seed=1).image)
-    assert np.array_equal(pickle.loads(pickle.dumps(papsynth.Dataset(recipe, length=2)))[1].image, papsynth.render(plain, index=1).image)
+    assert np.array_equal(
+        pickle.loads(pickle.dumps(papsynth.Dataset(recipe, length=2)))[1].image, papsynth.render(plain, index=1).image
+    )
     with pytest.raises(TypeError):
         Field(widht_px=3)
     tool = Path(__file__).parent.parent / "tools/write_recipes.py"
-    checked = subprocess.run([sys.executable, tool, "--check"], input=json.dumps(papsynth.schema()), capture_output=True, text=True)
+    checked = subprocess.run(
+        [sys.executable, tool, "--check"], input=json.dumps(papsynth.schema()), capture_output=True, text=True
+    )
     assert checked.returncode == 0, checked.stderr
 
 
@@ -412,7 +461,9 @@ def test_a_field_that_a_recipe_does_not_have_is_refused_and_recipes_are_copied()
 @pytest.mark.skipif(not os.path.exists("/proc/meminfo"), reason="the system does not tell what memory there is")
 def test_what_does_not_fit_into_memory_is_refused():
     with pytest.raises(MemoryError, match=r"field.width_px.* GiB"):
-        papsynth.Dataset({"field": {"width_px": 32768, "height_px": 32768}, "focus": {"planes": 21}, "light": {"kind": "colour"}})
+        papsynth.Dataset(
+            {"field": {"width_px": 32768, "height_px": 32768}, "focus": {"planes": 21}, "light": {"kind": "colour"}}
+        )
 
 
 def test_a_class_is_learned_and_rendered():
@@ -429,7 +480,13 @@ def test_a_class_is_learned_and_rendered():
     assert "mine" in frame.table["class"]
     samples = papsynth.Dataset({**SMALL, "cells": {"mine": {"count": 3}}}, seed=1, model=model)
     assert np.array_equal(pickle.loads(pickle.dumps(samples))[0].image, frame.image)
-    for wrong in ({"like": "unknown"}, {"pixel_um": -1.0}, {"nuclei": nuclei[:1]}, {"cytoplasm_outlines": [np.zeros((4, 3))]}, {"nuclei": [(np.ones((3, 3)), np.ones((4, 4)))]}):
+    for wrong in (
+        {"like": "unknown"},
+        {"pixel_um": -1.0},
+        {"nuclei": nuclei[:1]},
+        {"cytoplasm_outlines": [np.zeros((4, 3))]},
+        {"nuclei": [(np.ones((3, 3)), np.ones((4, 4)))]},
+    ):
         with pytest.raises(ValueError):
             papsynth.learn(**{"name": "mine", "pixel_um": 0.25, "nuclei": nuclei, "like": "intermediate", **wrong})
 
@@ -482,7 +539,13 @@ def test_a_camera_is_measured():
     assert abs(found["camera"]["gain_dn_per_e"] - 0.25) < 0.006 and len(found["camera"]["levels"]) == 5
     assert abs(found["recipe"]["camera"]["offset_dn"] - 100) < 0.2 and found["recipe"]["camera"]["bits"] == 12
     papsynth.recipe(found["recipe"])
-    for wrong in ((flats, darks, 8), (flats, [], 12), (flats, darks, 17), (flats, darks + 0.5, 12), (flats, darks, None)):
+    for wrong in (
+        (flats, darks, 8),
+        (flats, [], 12),
+        (flats, darks, 17),
+        (flats, darks + 0.5, 12),
+        (flats, darks, None),
+    ):
         with pytest.raises(ValueError):
             papsynth.calibrate_camera(*wrong[:2], bits=wrong[2])
 
@@ -503,7 +566,9 @@ def test_fields_are_judged():
 def test_a_recipe_is_matched_to_fields():
     start = {"field": {"width_px": 340, "height_px": 260, "pixel_um": 0.5}}
     other = {**start, "background": {"level": 0.8, "texture": 0.004}}
-    fields = [papsynth.render({**other, "slide": {"fields_per_slide": 1}}, seed=3, index=index).image for index in range(3)]
+    fields = [
+        papsynth.render({**other, "slide": {"fields_per_slide": 1}}, seed=3, index=index).image for index in range(3)
+    ]
     found = papsynth.match(fields, 0.5, recipe=start, simulations=60, seed=1)
     level = next(p for p in found["parameters"] if p["parameter"] == "level")
     assert abs(level["value"] - 0.8) < 0.03 and len(level["fields"]) == len(found["recipe"]["conditions"]) == 3
@@ -525,7 +590,9 @@ def test_targets_are_those_of_detectors():
     target = papsynth.detection_target(frame)
     count = len(target["labels"])
     assert count == (frame.table["part"] == "nucleus").sum() and target["boxes"].shape == (count, 4)
-    assert (target["boxes"][:, 2:] > target["boxes"][:, :2]).all() and np.array_equal(target["masks"].sum(axis=(1, 2)), target["area"])
+    assert (target["boxes"][:, 2:] > target["boxes"][:, :2]).all() and np.array_equal(
+        target["masks"].sum(axis=(1, 2)), target["area"]
+    )
     some = papsynth.detection_target(frame, "cytoplasm", ["superficial", "intermediate"])
     assert set(some["labels"]) <= {1, 2} and len(some["labels"]) > 0
     with pytest.raises(ValueError, match="part"):
@@ -575,7 +642,10 @@ def test_semantic_targets_have_nuclei_mimics_and_ignored_pixels(tmp_path):
     assert [one["iscrowd"] for one in annotations] == list(expected)
     assert not papsynth.verify(tmp_path / "set", 1)["findings"]
     for call, message in (
-        (lambda: papsynth.semantic_target(frame, ["nuclei"]), "classes: unknown class `nuclei`; expected some of background, "),
+        (
+            lambda: papsynth.semantic_target(frame, ["nuclei"]),
+            "classes: unknown class `nuclei`; expected some of background, ",
+        ),
         (lambda: papsynth.semantic_target(frame, "nucleus"), "classes: 'nucleus'; expected a list of unique names"),
         (lambda: papsynth.semantic_target(frame, ["shred", papsynth.MIMICS]), "expected a list of unique names"),
         (lambda: papsynth.semantic_target(frame, min_detectability=-1), "min_detectability: -1 is out of range"),
@@ -659,7 +729,10 @@ for delay in (0.0005, 0.002, 0.005):
         (lambda a: papsynth.noise.expose(a * np.nan), "electrons[0, 0]: NaN"),
         (lambda a: papsynth.noise.expose(-a), "electrons[0, 0]: -1"),
         (lambda a: papsynth.noise.expose(a + 1j), "electrons: expected booleans, integers or floats, found complex128"),
-        (lambda a: papsynth.noise.expose(a.astype("U")), "electrons: expected booleans, integers or floats, found <U32"),
+        (
+            lambda a: papsynth.noise.expose(a.astype("U")),
+            "electrons: expected booleans, integers or floats, found <U32",
+        ),
         (lambda a: papsynth.optics.bright_field(a, np.nan), "defocus_um"),
         (lambda a: papsynth.optics.gaussian(a * 1e300, 2), "image[0, 0]: inf"),
         (lambda a: papsynth.optics.gaussian(a[0], 2), "image: expected two dimensions, found the shape [12]"),
@@ -667,12 +740,18 @@ for delay in (0.0005, 0.002, 0.005):
         (lambda a: papsynth.texture.quilt(a, a[1:], a), "mask: expected the shape of source, (12, 12), found (11, 12)"),
         (lambda a: papsynth.fsd.trace(a * 255), "mask[0, 0]: 255 is out of range: expected 0 to 1"),
         (lambda a: papsynth.fsd.ShapeModel([a, a, None]), "outlines[0]: expected the shape (n, 2), found (12, 12)"),
-        (lambda a: papsynth.cloth.crumple(np.ones((70000, 2)), (48, 64)), "outline: expected 3 to 65536 points, found 70000"),
+        (
+            lambda a: papsynth.cloth.crumple(np.ones((70000, 2)), (48, 64)),
+            "outline: expected 3 to 65536 points, found 70000",
+        ),
         (lambda a: papsynth.render("nonexist"), "recipe: no file or preset `nonexist`"),
         (lambda a: papsynth.render(5), "recipe: expected None, a dictionary, the path of a TOML file or one of lbc"),
         (lambda a: papsynth.render(SMALL, threads=2000), "threads: 2000"),
         (lambda a: papsynth.learn("lsil", 0.25, cytoplasm_outlines=[]), "expected at least one of these"),
-        (lambda a: papsynth.learn("lsil", 0.25, cytoplasm_outlines=[a[:2, :2]]), "cytoplasm_outlines[0]: expected 3 or more points, found 2"),
+        (
+            lambda a: papsynth.learn("lsil", 0.25, cytoplasm_outlines=[a[:2, :2]]),
+            "cytoplasm_outlines[0]: expected 3 or more points, found 2",
+        ),
         (lambda a: papsynth.generate(SMALL, "", 3), "the path of the data set is empty"),
         (lambda a: papsynth.generate(SMALL, "x", 0), "frames: 0"),
         (lambda a: papsynth.missing("x", 2**64 - 1), "frames: 18446744073709551615"),

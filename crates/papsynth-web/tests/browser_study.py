@@ -110,8 +110,10 @@ def check_results(folder, given, keys, showings, exposure_ms):
     positive, negative = keys
     count = lambda truth, answer: sum(row["truth"] == truth and row["answer"] == answer for row in counted)
     counts = {
-        "tp": count(positive, positive), "fp": count(negative, positive),
-        "tn": count(negative, negative), "fn": count(positive, negative),
+        "tp": count(positive, positive),
+        "fp": count(negative, positive),
+        "tn": count(negative, negative),
+        "fn": count(positive, negative),
     }
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["finished"] and summary["row"]["counts"] == counts, (summary["row"], counts)
@@ -132,7 +134,12 @@ def yes_no(program, browser, real, synthetic, folder):
     # A key during the exposure must not count.
     browser.when("patch", "document.dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowLeft' }))")
     browser.press(" ")
-    ways = [("press", "ArrowLeft", "real"), ("click", "#second", "synthetic"), ("press", "s", "synthetic"), ("click", "#first", "real")]
+    ways = [
+        ("press", "ArrowLeft", "real"),
+        ("click", "#second", "synthetic"),
+        ("press", "s", "synthetic"),
+        ("click", "#first", "real"),
+    ]
     for trial in range(12):
         again = 1
         if trial == 3:
@@ -155,10 +162,13 @@ def yes_no(program, browser, real, synthetic, folder):
             browser.wait("question")
         if trial == 2:
             # Hides the page during the next exposure.
-            browser.when("patch", """
+            browser.when(
+                "patch",
+                """
                 Object.defineProperty(document, "hidden", { get: () => true, configurable: true });
                 document.dispatchEvent(new Event("visibilitychange"));
-            """)
+            """,
+            )
         if trial == 6:
             code, _ = study.interrupt()
             assert code == 130, code
@@ -192,19 +202,36 @@ def yes_no(program, browser, real, synthetic, folder):
     showings[at : at + 2] = [int(rows_of(subject)[at]["showings"])]
     assert showings[at] in (1, 2)
     summary, _ = check_results(subject, given, ("real", "synthetic"), showings, EXPOSURE_MS)
-    shown = browser.run("[...document.querySelectorAll('#row tbody tr')].map(r => [...r.cells].map(c => c.firstChild.textContent))")
+    shown = browser.run(
+        "[...document.querySelectorAll('#row tbody tr')].map(r => [...r.cells].map(c => c.firstChild.textContent))"
+    )
     counts = summary["row"]["counts"]
     assert shown[0][:5] == ["01", *(str(counts[name]) for name in ("tp", "fp", "tn", "fn"))], shown
     assert shown[1][0] == "x"
-    names = [path.name for side in (real, synthetic) for path in Path(side).rglob("*.png")] + [str(real), str(synthetic)]
+    names = [path.name for side in (real, synthetic) for path in Path(side).rglob("*.png")] + [
+        str(real),
+        str(synthetic),
+    ]
     check_secrets(browser, address, names)
     code, out = study.interrupt()
     assert code == 0 and "accuracy" in out, (code, out)
 
 
 def pairs(program, browser, real, synthetic, folder):
-    words = [real, synthetic, "--out", folder / "pairs", "--design", "2afc", "--trials", 4, "--training", 1,
-             "--exposure-ms", LONG_EXPOSURE_MS]
+    words = [
+        real,
+        synthetic,
+        "--out",
+        folder / "pairs",
+        "--design",
+        "2afc",
+        "--trials",
+        4,
+        "--training",
+        1,
+        "--exposure-ms",
+        LONG_EXPOSURE_MS,
+    ]
     study = serve_study(program, words)
     browser.open(study.address)
     browser.wait("welcome")
@@ -257,7 +284,9 @@ def main():
         assert not complaints, complaints
     finally:
         browser.close()
-    pooled = subprocess.run([program, "study", "--results", folder / "out"], check=True, capture_output=True, text=True).stdout
+    pooled = subprocess.run(
+        [program, "study", "--results", folder / "out"], check=True, capture_output=True, text=True
+    ).stdout
     assert "01" in pooled and "pooled" in pooled and "384 trials" in pooled, pooled
     print(f"the study passed in {Path(chromium).name}; screenshots are in {folder}")
 

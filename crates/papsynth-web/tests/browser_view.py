@@ -19,7 +19,10 @@ class Viewer(Browser):
     """A browser with the page of the viewer."""
 
     def ready(self):
-        self.until("document.body?.dataset.ready === 'true'", lambda: self.run("document.getElementById('message').textContent"))
+        self.until(
+            "document.body?.dataset.ready === 'true'",
+            lambda: self.run("document.getElementById('message').textContent"),
+        )
 
     def text(self, name):
         return self.run(f"document.getElementById('{name}').textContent")

@@ -33,7 +33,9 @@ class Workbench(Browser):
 
     def hash(self):
         self.ready()
-        self.until("document.body.dataset.hash !== undefined && element('hash').textContent === document.body.dataset.hash")
+        self.until(
+            "document.body.dataset.hash !== undefined && element('hash').textContent === document.body.dataset.hash"
+        )
         return self.run("document.body.dataset.hash")
 
     def change(self, selector, value):
@@ -205,7 +207,9 @@ def check_match(browser, program, folder):
     browser.ready()
     browser.until("document.querySelectorAll('#distances meter').length > 5")
     browser.click("#match-quick")
-    browser.until("element('match-quick').checked && /simulated fields, about [0-9]+ /.test(element('match-plan').textContent)")
+    browser.until(
+        "element('match-quick').checked && /simulated fields, about [0-9]+ /.test(element('match-plan').textContent)"
+    )
     browser.click("#match-start")
     browser.until("element('match-progress').value > 0 && !element('match-cancel').hidden")
     browser.picture(folder / "matching.png")
@@ -237,8 +241,19 @@ def check_match(browser, program, folder):
 
 # Roles of controls and of graphics in the accessibility tree.
 NAMED = {
-    "button", "checkbox", "combobox", "DisclosureTriangle", "image", "link", "meter", "progressbar", "searchbox",
-    "slider", "spinbutton", "tab", "textbox",
+    "button",
+    "checkbox",
+    "combobox",
+    "DisclosureTriangle",
+    "image",
+    "link",
+    "meter",
+    "progressbar",
+    "searchbox",
+    "slider",
+    "spinbutton",
+    "tab",
+    "textbox",
 }
 
 # What the browser focuses with the Tab key, in the order of the document.

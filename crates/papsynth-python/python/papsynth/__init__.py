@@ -10,7 +10,6 @@ The same recipe, model, seed and index give the same bytes as the command line, 
 
 from __future__ import annotations
 
-
 from . import cloth, cytoskeleton, dyes, fields, fsd, noise, optics, texture
 from ._calibrate import calibrate_camera, calibrate_microscope
 from ._dataset import Dataset, IterableDataset

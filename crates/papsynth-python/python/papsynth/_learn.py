@@ -119,6 +119,7 @@ def judge(
         The content of ``report.json`` of `papsynth judge`.
     """
     real = list(real)
+
     def listed(values):
         return None if values is None else list(values)
 

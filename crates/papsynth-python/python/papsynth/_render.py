@@ -35,7 +35,9 @@ def _key(recipe, model):
         return path, found.st_mtime_ns, found.st_size
 
     try:
-        model = None if model is None else json.dumps(model, sort_keys=True) if isinstance(model, dict) else of_file(model)
+        model = (
+            None if model is None else json.dumps(model, sort_keys=True) if isinstance(model, dict) else of_file(model)
+        )
         if recipe is None:
             return None, model
         if hasattr(recipe, "to_dict"):

@@ -29,7 +29,9 @@ _OPTIONS = ("formats", "frames_per_shard", "without", "scenes", "threads", "veri
 def shard_count(recipe: Any, frames: int, options: dict[str, Any]) -> int:
     """Return the number of shards. Raises errors of recipe and options before a cluster starts."""
     if unknown := set(options) - set(_OPTIONS):
-        raise TypeError(f"{', '.join(sorted(unknown))}: unknown option; expected {', '.join(_OPTIONS[:-1])} or {_OPTIONS[-1]}")
+        raise TypeError(
+            f"{', '.join(sorted(unknown))}: unknown option; expected {', '.join(_OPTIONS[:-1])} or {_OPTIONS[-1]}"
+        )
     engine(recipe, options.get("model"))
     formats, without = _list(options.get("formats")), _list(options.get("without"))
     return _native.shards(frames, formats, options.get("frames_per_shard"), without)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import papsynth
 from magicgui.widgets import CheckBox, ComboBox, Container, Label, LineEdit, PushButton, SpinBox, TextEdit
+
+import papsynth
 
 from .._schema import Entry, differences, entries, value_at, with_value
 from ._editors import LARGEST, Editor, editor
