@@ -4,17 +4,21 @@ Each input line contains the name of a workload and a number of seconds. The wor
 once. The output is a line of JSON with the CPU time of each run. Each workload runs once before its first measurement.
 """
 
-import os
-
-for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ[threads] = "1"
 import json
 import math
+import os
 import sys
 import time
 
+# NumPy, OpenCV and numba read these variables when they are imported.
+os.environ["OMP_NUM_THREADS"] = "1"
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+os.environ["MKL_NUM_THREADS"] = "1"
+os.environ["NUMBA_NUM_THREADS"] = "1"
+
 import cv2
 import numpy as np
+
 import papsim
 
 cv2.setNumThreads(1)
@@ -83,11 +87,9 @@ def perlin():
     from pyfastnoiselite.pyfastnoiselite import FastNoiseLite, FractalType, NoiseType
 
     octave = FastNoiseLite(7)
-    octave.noise_type, octave.fractal_type, octave.frequency = (
-        NoiseType.NoiseType_Perlin,
-        FractalType.FractalType_None,
-        1 / 64,
-    )
+    octave.noise_type = NoiseType.NoiseType_Perlin
+    octave.fractal_type = FractalType.FractalType_None
+    octave.frequency = 1 / 64
     y, x = np.mgrid[:HEIGHT, :WIDTH].astype(F)
     coordinates = np.stack([x.ravel(), y.ravel()])
     return lambda: octave.gen_from_coords(coordinates), 1

@@ -54,7 +54,7 @@ class Served:
 
 
 def is_harmless(entry):
-    """Return whether an entry of the log says that the program was restarting, or that a compared image was replaced."""
+    """Return whether an entry of the log says that the program was restarting, or a compared image was replaced."""
     text, url = entry["text"], entry.get("url", "")
     is_replaced = "404 (Not Found)" in text and url.endswith("/compare")
     return "ERR_CONNECTION" in text or "ERR_EMPTY_RESPONSE" in text or is_replaced

@@ -1,15 +1,18 @@
 """Trains two small U-Nets to outline overlapping cells, and tests them on other synthetic fields.
 
-    overlap_net.py --train SET [SET ...] --test SET [SET ...] --out RESULT.json [--steps N] [--seed N] [--weights PREFIX]
+    overlap_net.py --train SET [SET ...] --test SET [SET ...] --out RESULT.json
+                   [--steps N] [--seed N] [--weights PREFIX]
 
-A SET is a data set of `papsynth generate` in the format `folder`; SET:N uses its first N fields. The first network, the finder, sees a field
-and returns a heat map of the centres of nuclei. The second one, the outliner, sees the surroundings of one nucleus and returns the complete
-(amodal) mask of its cytoplasm, also where other cells cover it. Masks may therefore overlap. Equal parts of each batch come from each SET.
+A SET is a data set of `papsynth generate` in the format `folder`; SET:N uses its first N fields. The first network, the
+finder, sees a field and returns a heat map of the centres of nuclei. The second one, the outliner, sees the
+surroundings of one nucleus and returns the complete (amodal) mask of its cytoplasm, also where other cells cover it.
+Masks may therefore overlap. Equal parts of each batch come from each SET.
 
-Score, as in the challenge of ISBI 2014: a cell is found if a mask has a Dice coefficient of more than 0.7 with its complete cytoplasm; each mask
-counts for one cell. The score is the mean Dice coefficient of the cells that are found, and the share of cells that are missed. Masks end at
-the border of the image. All cells count whose nucleus lies completely inside the image, however many other cells cover them. Masks that match
-no cell with a nucleus in the image are counted as false. Writes the counts of every field as JSON.
+Score, as in the challenge of ISBI 2014: a cell is found if a mask has a Dice coefficient of more than 0.7 with its
+complete cytoplasm; each mask counts for one cell. The score is the mean Dice coefficient of the cells that are found,
+and the share of cells that are missed. Masks end at the border of the image. All cells count whose nucleus lies
+completely inside the image, however many other cells cover them. Masks that match no cell with a nucleus in the image
+are counted as false. Writes the counts of every field as JSON.
 """
 
 import argparse
@@ -21,16 +24,16 @@ os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
 
 import numpy as np
 import tensorflow as tf
-from nucleus_net import normalized
 from PIL import Image
 from scipy import ndimage, sparse
 from scipy.optimize import linear_sum_assignment
 
+from nucleus_net import normalized
+
 FINE_UM = 0.5  # pixel size of the light that the networks see; masks and heat maps have pixels of 1 µm
 MATCH = 0.7  # smallest Dice coefficient of a cell that is found
-FINDER = dict(
-    side=128, batch=8, fold=4, channels=(24, 48, 64)
-)  # side in µm; light is folded into channels of the first level
+# Sides are in µm; light is folded into channels of the first level.
+FINDER = dict(side=128, batch=8, fold=4, channels=(24, 48, 64))
 OUTLINER = dict(side=112, batch=16, fold=4, channels=(32, 64, 96, 128))
 SPOT_UM = 2.5  # standard deviation of the spots at the centres of nuclei
 PEAK = 0.4  # smallest height of a detected centre, relative to that of a spot
@@ -65,7 +68,10 @@ def resized(values, size, how=Image.Resampling.BOX):
 
 
 def load(name, limit=None):
-    """Return the fields of a set: light with pixels of FINE_UM, centres of nuclei (µm), and the corner and mask of each cytoplasm (µm)."""
+    """Return the fields of a set.
+
+    A field has light with pixels of FINE_UM, centres of nuclei (µm), and the corner and mask of each cytoplasm (µm).
+    """
     path, _, count = name.partition(":")
     fields = []
     for file in sorted((Path(path) / "shards").glob("*.coco.json")):
@@ -75,9 +81,8 @@ def load(name, limit=None):
                 return fields
             full = image["height"], image["width"]
             size = tuple(round(side * image["pixel_um"]) for side in full)
-            light = resized(
-                normalized(Image.open(Path(path) / image["file_name"])), [round(side / FINE_UM) for side in size]
-            )
+            fine_size = [round(side / FINE_UM) for side in size]
+            light = resized(normalized(Image.open(Path(path) / image["file_name"])), fine_size)
             objects = [a for a in shard["annotations"] if a["image_id"] == image["id"]]
             nuclei = {a["object_id"]: a for a in objects if a["part"] == "nucleus"}
             cells = [a for a in objects if a["part"] == "cytoplasm" and a["object_id"] in nuclei]
@@ -97,7 +102,10 @@ def load(name, limit=None):
 
 
 def window(values, corner, side, outside=0.0, fine=1):
-    """Return a square part of an array, `outside` beyond its border; the corner (y, x) and the side are in units of `fine` pixels."""
+    """Return a square part of an array, `outside` beyond its border.
+
+    The corner (y, x) and the side are in units of `fine` pixels.
+    """
     part = np.full((side * fine, side * fine), outside, np.float32)
     start = [c * fine for c in corner]
     low = [min(max(s, 0), n) for s, n in zip(start, values.shape)]
@@ -140,9 +148,8 @@ def network(kind, maps):
 
     def block(x, channels):
         for _ in range(2):
-            x = layers.ReLU()(
-                layers.BatchNormalization()(layers.Conv2D(channels, 3, padding="same", use_bias=False)(x))
-            )
+            x = layers.Conv2D(channels, 3, padding="same", use_bias=False)(x)
+            x = layers.ReLU()(layers.BatchNormalization()(x))
         return x
 
     factor = round(kind["fold"] * FINE_UM)
@@ -157,9 +164,9 @@ def network(kind, maps):
         x = layers.Conv2D(channels, 3, padding="same")(layers.UpSampling2D()(x))
         x = block(layers.Concatenate()([x, skip]), channels)
     x = layers.Conv2D(factor**2, 1)(x)
-    return tf.keras.Model(
-        start, tf.keras.layers.Lambda(lambda y: tf.nn.depth_to_space(y, factor))(x) if factor > 1 else x
-    )
+    if factor > 1:
+        x = layers.Lambda(lambda y: tf.nn.depth_to_space(y, factor))(x)
+    return tf.keras.Model(start, x)
 
 
 def altered(light, rng):
@@ -215,9 +222,8 @@ def outliner_example(fields, rng):
 def train(net, kind, example, sets, steps, seed, dice):
     """Train a network on batches of which each set gives an equal part."""
     rng = np.random.default_rng(seed)
-    optimizer = tf.keras.optimizers.AdamW(
-        tf.keras.optimizers.schedules.CosineDecay(2e-3, steps, warmup_target=2e-3), weight_decay=1e-4
-    )
+    rate = tf.keras.optimizers.schedules.CosineDecay(2e-3, steps, warmup_target=2e-3)
+    optimizer = tf.keras.optimizers.AdamW(rate, weight_decay=1e-4)
 
     @tf.function(autograph=False)
     def step(images, targets, weights):
@@ -277,7 +283,10 @@ def find_wrong(finder, fields):
 
 
 def outlines(outliner, field, centres):
-    """Return the probability of the cytoplasm at each of the centres, and its corner, the mean over turned and mirrored images."""
+    """Return the corner and the probability of the cytoplasm at each of the centres.
+
+    The probability is the mean over turned and mirrored images.
+    """
     side, fine = OUTLINER["side"], round(1 / FINE_UM)
     found = []
     for own in range(len(centres)):
@@ -294,7 +303,10 @@ def outlines(outliner, field, centres):
 
 
 def cells(found, field):
-    """Return the masks of the cells, with the pixels of the image; of two that are nearly the same, only the more certain one."""
+    """Return the masks of the cells, with the pixels of the image.
+
+    Of two masks that are nearly the same, returns only the more certain one.
+    """
     masks, kept = [], []
     certain = [float(p[p > COVERED].mean()) if (p > COVERED).sum() >= SMALLEST_UM2 else 0.0 for _, p in found]
     for index in np.argsort(certain)[::-1]:
@@ -304,9 +316,8 @@ def cells(found, field):
         whole = np.zeros(field["size"], np.float32)
         low = [max(c, 0) for c in corner]
         high = [min(c + n, m) for c, n, m in zip(corner, part.shape, field["size"])]
-        whole[low[0] : high[0], low[1] : high[1]] = part[
-            tuple(slice(a - c, b - c) for a, b, c in zip(low, high, corner))
-        ]
+        inside = tuple(slice(a - c, b - c) for a, b, c in zip(low, high, corner))
+        whole[low[0] : high[0], low[1] : high[1]] = part[inside]
         mask = whole > COVERED
         if all((mask & other).sum() <= SAME * (mask | other).sum() for other in kept):
             kept.append(mask)

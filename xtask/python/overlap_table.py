@@ -1,8 +1,9 @@
-"""Prints the table of `cargo xtask worth --overlap`: Dice of overlapping cells and share of missed ones, for each test set.
+"""Prints the table of `cargo xtask worth --overlap`: Dice of overlapping cells and share of missed ones by test set.
 
     overlap_table.py FOLDER
 
-FOLDER has a file of overlap_net.py for each training. Intervals of 95 % are bootstraps over fields, with all trainings of each field.
+FOLDER has a file of overlap_net.py for each training. Intervals of 95 % are bootstraps over fields, with all trainings
+of each field.
 """
 
 import json
@@ -37,15 +38,10 @@ def main():
             measures([f for i in rng.integers(len(fields), size=len(fields)) for f in fields[i]]) for _ in range(DRAWS)
         ]
         means = measures([f for field in fields for f in field])
-        parts = [
-            f"{mean:.3f} ({low:.3f} to {high:.3f})"
-            for mean, low, high in zip(means, *np.quantile(draws, (0.025, 0.975), axis=0))
-        ]
-        print(
-            " | ".join(
-                [test, str(trainings), str(len(fields)), str(sum(field[0]["cells"] for field in fields)), *parts]
-            )
-        )
+        lows, highs = np.quantile(draws, (0.025, 0.975), axis=0)
+        parts = [f"{mean:.3f} ({low:.3f} to {high:.3f})" for mean, low, high in zip(means, lows, highs)]
+        cells = sum(field[0]["cells"] for field in fields)
+        print(" | ".join([test, str(trainings), str(len(fields)), str(cells), *parts]))
 
 
 if __name__ == "__main__":

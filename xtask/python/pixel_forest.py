@@ -2,9 +2,9 @@
 
     pixel_forest.py SYNTHETIC IMAGE MASK [--fields 20]
 
-SYNTHETIC is a data set of `papsynth generate`; IMAGE a real field, MASK its nuclei. A forest of 100 trees classifies pixels of the first fields by Gaussian,
-Hessian and Sobel features at sigma 1 to 8. The probability threshold is the one with the best Dice coefficient on the other fields of the
-data set. Prints one line of JSON.
+SYNTHETIC is a data set of `papsynth generate`; IMAGE a real field, MASK its nuclei. A forest of 100 trees classifies
+pixels of the first fields by Gaussian, Hessian and Sobel features at sigma 1 to 8. The probability threshold is the one
+with the best Dice coefficient on the other fields of the data set. Prints one line of JSON.
 """
 
 import argparse
@@ -23,7 +23,10 @@ SEED = 0
 
 
 def features(grey):
-    """Return the features of every pixel: absorbance relative to the background, blurred, gradients, eigenvalues of the Hessian."""
+    """Return the features of every pixel.
+
+    They are the absorbance relative to the background, blurred, its gradients, and the eigenvalues of the Hessian.
+    """
     background = max(np.percentile(grey, 95), 1.0)
     image = -np.log10(np.clip(grey, 1.0, None) / background).astype(np.float32)
     columns = [image]
@@ -77,7 +80,10 @@ def main():
             sides.append(np.full(chosen.size, side))
     forest = RandomForestClassifier(100, min_samples_leaf=5, n_jobs=-1, random_state=SEED)
     forest.fit(np.concatenate(rows), np.concatenate(sides))
-    probability = lambda grey: forest.predict_proba(features(grey))[:, 1].reshape(grey.shape)
+
+    def probability(grey):
+        return forest.predict_proba(features(grey))[:, 1].reshape(grey.shape)
+
     thresholds = np.linspace(0.3, 0.98, 35)
     scores = np.zeros(thresholds.size)
     for grey, nuclei in fields[seen:]:
@@ -88,16 +94,13 @@ def main():
     grey = np.asarray(Image.open(arguments.image).convert("L"), dtype=np.float32)
     true = np.asarray(Image.open(arguments.mask).convert("L")) > 0
     real = dice(probability(grey) >= threshold, true)
-    print(
-        json.dumps(
-            {
-                "fields": seen,
-                "threshold": round(float(threshold), 3),
-                "dice_synthetic": round(float(scores.max()), 3),
-                "dice_real": round(real, 3),
-            }
-        )
-    )
+    found = {
+        "fields": seen,
+        "threshold": round(float(threshold), 3),
+        "dice_synthetic": round(float(scores.max()), 3),
+        "dice_real": round(real, 3),
+    }
+    print(json.dumps(found))
 
 
 if __name__ == "__main__":

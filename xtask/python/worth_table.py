@@ -2,8 +2,8 @@
 
     worth_table.py FOLDER
 
-FOLDER has a file ARM-HALF-SEED.json of nucleus_net.py for each training. F1 counts the nuclei of all fields of a grade, of both halves and all
-seeds. Intervals of 95 % are bootstraps over fields.
+FOLDER has a file ARM-HALF-SEED.json of nucleus_net.py for each training. F1 counts the nuclei of all fields of a grade,
+of both halves and all seeds. Intervals of 95 % are bootstraps over fields.
 """
 
 import json

@@ -3,9 +3,9 @@ shards/*.coco.json.
 
 Usage: python external_formats.py DIR [PAGES]
 
-DIR is a data set with all formats. PAGES is the folder docs/formats; the Python code of its pages is run.
-Needs numpy, pillow, tifffile, imagecodecs, ome-types, lxml, pycocotools, webdataset, shapely. Prints a line for each check
-and exits with status 1 at the first failure.
+DIR is a data set with all formats. PAGES is the folder docs/formats; the Python code of its pages is run. Needs numpy,
+pillow, tifffile, imagecodecs, ome-types, lxml, pycocotools, webdataset, shapely. Prints a line for each check and exits
+with status 1 at the first failure.
 """
 
 import contextlib
@@ -26,11 +26,12 @@ import ome_types
 import shapely
 import tifffile
 import webdataset
-from external import GROUPS, check, check_manifest, equal, passed, read_json
 from PIL import Image
 from pycocotools import mask as rle
 from pycocotools.coco import COCO
 from shapely.geometry import shape
+
+from external import GROUPS, check, check_manifest, equal, passed, read_json
 
 # Groups of the formats for segmenters.
 FLAT = ["cytoplasm", "nucleus"]
@@ -324,9 +325,8 @@ def check_webdataset(folder, frames, records, splits):
         own = next(iter(webdataset.WebDataset(urls, shardshuffle=False).decode("rgb8")))
         picture = frames[0].at_8_bits(frames[0].picture())
         same("png by webdataset's own decoder", own["png"], picture if frames[0].colour else np.dstack([picture] * 3))
-    passed(
-        f"webdataset: {len(samples)} samples in {len(urls)} tar files, pixels, labels and ground truth as in other formats"
-    )
+    read = f"{len(samples)} samples in {len(urls)} tar files"
+    passed(f"webdataset: {read}, pixels, labels and ground truth as in other formats")
 
 
 def check_pairs(what, frame, group, image, masks):
@@ -379,7 +379,10 @@ def twice_area(ring):
 
 
 def check_yolo(folder, frames, splits, categories):
-    """Checks the rules of Ultralytics: labels/SPLIT/NAME.txt and images/SPLIT/NAME.png; class and fractions, at least three corners."""
+    """Checks the rules of Ultralytics: names of files, class and fractions of objects, at least three corners.
+
+    Files are labels/SPLIT/NAME.txt and images/SPLIT/NAME.png.
+    """
     here = folder / "yolo-seg"
     text = (here / "data.yaml").read_text()
     names = [json.loads(name) for name in re.findall(r"^  \d+: (.*)$", text, re.M)]

@@ -1,10 +1,10 @@
-"""Checks a data set in all formats with further readers, which take longer to install than those of external_formats.py.
+"""Checks a data set in all formats with readers that take longer to install than those of external_formats.py.
 
 Usage: python external_full.py DIR PAGES [JAR]
 
-DIR was written by a program built with the feature `parquet`, with the format huggingface. Needs mlcroissant, datasets, pyarrow,
-opencv-python-headless and the packages of external_formats.py. JAR is the package of Bio-Formats, the reader of Fiji and QuPath; it
-needs Java. Prints a line for each check and exits with status 1 at the first failure.
+DIR was written by a program built with the feature `parquet`, with the format huggingface. Needs mlcroissant, datasets,
+pyarrow, opencv-python-headless and the packages of external_formats.py. JAR is the package of Bio-Formats, the reader
+of Fiji and QuPath; it needs Java. Prints a line for each check and exits with status 1 at the first failure.
 """
 
 import contextlib
@@ -25,10 +25,11 @@ import mlcroissant
 import numpy as np
 import pyarrow.parquet as pq
 import tifffile
-from external import check, check_manifest, equal, passed
-from external_formats import check_truth, same
 from PIL import Image
 from pycocotools import mask as rle
+
+from external import check, check_manifest, equal, passed
+from external_formats import check_truth, same
 
 
 def check_croissant(folder, frames):
@@ -143,9 +144,8 @@ def check_huggingface(folder, frames, categories, splits):
                 raw = part.cast_column("image", datasets.Image(decode=False))
                 for row, bare in zip(part, raw):
                     check_row(row, bare, by_index[row["index"]], categories)
-    passed(
-        f"huggingface: datasets reads {len(frames)} frames in {len(expected)} splits, pixels, areas and run lengths as in other formats"
-    )
+    read = f"{len(frames)} frames in {len(expected)} splits"
+    passed(f"huggingface: datasets reads {read}, pixels, areas and run lengths as in other formats")
 
 
 def check_row(row, bare, frame, categories):

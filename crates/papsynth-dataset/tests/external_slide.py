@@ -1,8 +1,11 @@
-"""Reads a slide with zarr-python, tensorstore, ome-zarr-models, pyarrow, pycocotools and shapely: every pixel of every level, every mask.
+"""Reads every pixel of every level and every mask of a slide with independent readers.
+
+They are zarr-python, tensorstore, ome-zarr-models, pyarrow, pycocotools and shapely.
 
 Usage: python external_slide.py DIR PAGE
 
-DIR is a slide, PAGE the page whose Python code is run on it. Prints a line for each check and exits with status 1 at the first failure.
+DIR is a slide, PAGE the page whose Python code is run on it. Prints a line for each check and exits with status 1 at
+the first failure.
 """
 
 import csv
@@ -15,10 +18,11 @@ import numpy as np
 import pyarrow.dataset
 import tensorstore
 import zarr
-from external import check, passed
 from ome_zarr_models.v05.image import Image
 from pycocotools import mask as coco
 from shapely.geometry import shape
+
+from external import check, passed
 
 csv.field_size_limit(1 << 28)
 

@@ -2,8 +2,8 @@
 
 Usage: python external_trainers.py DIR...
 
-Each DIR is a data set in the formats cellpose and stardist. Libraries for training are replaced by mocks, because loaders do not need
-them. Prints a line for each check and exits with status 1 at the first failure.
+Each DIR is a data set in the formats cellpose and stardist. Libraries for training are replaced by mocks, because
+loaders do not need them. Prints a line for each check and exits with status 1 at the first failure.
 """
 
 import sys
@@ -14,6 +14,7 @@ from unittest.mock import MagicMock
 
 import numpy as np
 import tifffile
+
 from external import check, passed
 
 warnings.filterwarnings("ignore")

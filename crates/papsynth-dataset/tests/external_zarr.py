@@ -1,10 +1,10 @@
-"""Reads the OME-Zarr groups of a data set with the formats folder and ome-zarr with zarr-python, tensorstore, ome-zarr-models, ome-zarr
-and the reader of napari: every pixel of every level, every mask of every object.
+"""Reads the OME-Zarr groups of a data set with the formats folder and ome-zarr with zarr-python, tensorstore,
+ome-zarr-models, ome-zarr and the reader of napari: every pixel of every level, every mask of every object.
 
 Usage: python external_zarr.py DIR PAGES
 
-Needs zarr, tensorstore, ome-zarr-models, ome-zarr, napari-ome-zarr and the packages of external_formats.py. Prints a line for each check and
-exits with status 1 at the first failure.
+Needs zarr, tensorstore, ome-zarr-models, ome-zarr, napari-ome-zarr and the packages of external_formats.py. Prints a
+line for each check and exits with status 1 at the first failure.
 """
 
 import contextlib
@@ -17,13 +17,14 @@ from pathlib import Path
 import numpy as np
 import tensorstore
 import zarr
-from external import GROUPS, check, check_manifest, equal, passed
-from external_formats import check_truth, same
 from napari_ome_zarr import napari_get_reader
 from ome_zarr.io import parse_url
 from ome_zarr.reader import Reader
 from ome_zarr_models.v05.image import Image
 from ome_zarr_models.v05.image_label import ImageLabel
+
+from external import GROUPS, check, check_manifest, equal, passed
+from external_formats import check_truth, same
 
 
 def half(values):
@@ -102,9 +103,8 @@ def check_zarr(frames):
                 parent = annotation["parent_id"] and frame.coco.anns[annotation["parent_id"]]["object_id"]
                 equal(f"parent of {one.name} in {path}", row["parent"], parent)
                 objects += 1
-    passed(
-        f"ome-zarr: zarr-python and tensorstore read {arrays} levels pixel by pixel, {layers} label layers have {objects} complete masks"
-    )
+    masks = f"{layers} label layers have {objects} complete masks"
+    passed(f"ome-zarr: zarr-python and tensorstore read {arrays} levels pixel by pixel, {masks}")
 
 
 def check_models(frames):
@@ -152,7 +152,7 @@ def check_readers(frames):
         labels = [layer for layer in found if layer[2] == "labels"]
         equal(f"label layers of {path} for napari", len(labels), len(names))
         group = zarr.open_group(path, mode="r")
-        for (data, about, _), name in zip(labels, names):
+        for (data, _, _), name in zip(labels, names):
             same(f"labels {name} of {path} for napari", np.asarray(data[0]), group["labels"][name]["0"][:])
             layers += 1
     passed(f"ome-zarr: ome-zarr reads {len(frames)} images, the reader of napari also {layers} label layers")

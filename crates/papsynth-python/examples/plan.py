@@ -63,9 +63,8 @@ def simulate(shards, workers, tasks, seed):
 
 def main(images=10_000_000, workers=1000):
     shards = -(-images // IMAGES_PER_SHARD)
-    print(
-        f"{images} images, {shards} shards of {IMAGES_PER_SHARD}, {workers} workers of one thread; five simulations each"
-    )
+    task = f"{images} images, {shards} shards of {IMAGES_PER_SHARD}"
+    print(f"{task}, {workers} workers of one thread; five simulations each")
     print(f"{'tasks':>8} {'hours':>7} {'relative':>9} {'lost core hours':>16}")
     table = {}
     for tasks in (workers, 4 * workers, shards):

@@ -38,10 +38,9 @@ def main():
                 frame = papsynth.render(recipe, seed=11, index=index)
                 counts += score(by_contrast(frame.image, frame.pixel_um), truth_of(frame))
             table[field, value] = f1(counts)
-            print(
-                f"{field:28} {value:6}  F1 {f1(counts):.2f}  (found {counts[0]}, wrong {counts[1]}, missed {counts[2]})",
-                flush=True,
-            )
+            found, wrong, missed = counts
+            details = f"(found {found}, wrong {wrong}, missed {missed})"
+            print(f"{field:28} {value:6}  F1 {f1(counts):.2f}  {details}", flush=True)
     return table
 
 

@@ -2,8 +2,8 @@
 
 Usage: python train.py [FOLDER]
 
-FOLDER contains real fields as PNG, each with a CSV file of the same name: a line `y,x` for the centre of each nucleus. Needs
-numpy, scipy, scikit-learn and Pillow.
+FOLDER contains real fields as PNG, each with a CSV file of the same name: a line `y,x` for the centre of each nucleus.
+Needs numpy, scipy, scikit-learn and Pillow.
 """
 
 import csv

@@ -1,9 +1,11 @@
-"""Runs a job array on a local Slurm with requeued tasks and a killed daemon: the root hash must equal that of one process.
+"""Runs a job array on a local Slurm with requeued tasks and a killed daemon.
+
+The root hash must equal that of one process.
 
 Usage: python cluster_slurm.py PAPSYNTH FOLDER ROOT
 
-FOLDER is emptied. Needs Debian's slurm-wlm and munge, and root. Nothing of the system's own Slurm is touched: all files lie in a new folder below
-/tmp. ROOT is a file with the root hash that one process gives.
+FOLDER is emptied. Needs Debian's slurm-wlm and munge, and root. Nothing of the system's own Slurm is touched: all files
+lie in a new folder below /tmp. ROOT is a file with the root hash that one process gives.
 """
 
 import os
@@ -150,20 +152,8 @@ def main(program, folder, root):
     # The package is built without Parquet.
     told = subprocess.run([program, "generate", "--help"], capture_output=True, text=True, check=True).stdout
     own_words = [*WORDS, "--no-parquet"] if "--no-parquet" in told else WORDS
-    words = [
-        program,
-        "submit",
-        "slurm",
-        "--tasks",
-        str(TASKS),
-        "--threads",
-        "1",
-        "--",
-        "--out",
-        str(out),
-        "--quiet",
-        *own_words,
-    ]
+    options = ["--tasks", str(TASKS), "--threads", "1", "--", "--out", str(out), "--quiet"]
+    words = [program, "submit", "slurm", *options, *own_words]
     text = subprocess.run(words, capture_output=True, text=True, check=True).stdout
     script.write_text(text.replace("papsynth generate", f"{program} generate", 1))
     # munge requires a socket folder that only its owner can write.

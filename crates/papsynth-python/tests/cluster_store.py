@@ -2,8 +2,9 @@
 
 Usage: python cluster_store.py PROGRAM FOLDER
 
-PROGRAM is a papsynth that knows object stores. FOLDER is emptied. The store is one that speaks S3's protocol, on this machine, behind a
-server that refuses some requests and loses some answers. Prints a line for each check and ends with status 1 at the first that fails.
+PROGRAM is a papsynth that knows object stores. FOLDER is emptied. The store is one that speaks S3's protocol, on this
+machine, behind a server that refuses some requests and loses some answers. Prints a line for each check and ends with
+status 1 at the first that fails.
 """
 
 import http.client

@@ -108,10 +108,8 @@ def test_data_sets_have_the_root_hash_of_the_command_line(tmp_path):
 
 
 def has_parquet():
-    return (
-        "--no-parquet"
-        in subprocess.run([PROGRAM, "generate", "--help"], capture_output=True, text=True, check=True).stdout
-    )
+    told = subprocess.run([PROGRAM, "generate", "--help"], capture_output=True, text=True, check=True)
+    return "--no-parquet" in told.stdout
 
 
 def test_scenes_of_a_data_set_reproduce_its_frames(tmp_path):
@@ -281,9 +279,8 @@ def test_frames_survive_pickling(frame):
         )
         for name in ("image", "stack", "noise_free", "layers", "boxes", "defocus_um", "detectability"):
             assert np.array_equal(getattr(one, name), getattr(other, name)), name
-        assert all(np.array_equal(one.table[name], other.table[name]) for name in one.table) and list(
-            one.table
-        ) == list(other.table)
+        assert all(np.array_equal(one.table[name], other.table[name]) for name in one.table)
+        assert list(one.table) == list(other.table)
     restore, state = frame.__reduce__()
     for place, wrong in (
         (0, 2),
@@ -431,9 +428,8 @@ def test_recipes_are_objects_too_which_know_every_field():
         cells={"intermediate": CellMix(count=uniform(3, 5))},
     )
     plain = recipe.to_dict()
-    assert plain["optics"] == {"kind": "bright-field", "na": 0.9} and plain["cells"]["intermediate"]["count"] == {
-        "uniform": [3, 5]
-    }
+    assert plain["optics"] == {"kind": "bright-field", "na": 0.9}
+    assert plain["cells"]["intermediate"]["count"] == {"uniform": [3, 5]}
     assert np.array_equal(papsynth.render(recipe, seed=1).image, papsynth.render(plain, seed=1).image)
     assert np.array_equal(
         pickle.loads(pickle.dumps(papsynth.Dataset(recipe, length=2)))[1].image, papsynth.render(plain, index=1).image
@@ -590,9 +586,8 @@ def test_targets_are_those_of_detectors():
     target = papsynth.detection_target(frame)
     count = len(target["labels"])
     assert count == (frame.table["part"] == "nucleus").sum() and target["boxes"].shape == (count, 4)
-    assert (target["boxes"][:, 2:] > target["boxes"][:, :2]).all() and np.array_equal(
-        target["masks"].sum(axis=(1, 2)), target["area"]
-    )
+    assert (target["boxes"][:, 2:] > target["boxes"][:, :2]).all()
+    assert np.array_equal(target["masks"].sum(axis=(1, 2)), target["area"])
     some = papsynth.detection_target(frame, "cytoplasm", ["superficial", "intermediate"])
     assert set(some["labels"]) <= {1, 2} and len(some["labels"]) > 0
     with pytest.raises(ValueError, match="part"):

@@ -108,7 +108,10 @@ def check_results(folder, given, keys, showings, exposure_ms):
         assert row["correct"] == str(int(row["truth"] == row["answer"]))
     counted = [row for row in rows if row["stage"] == "counted"]
     positive, negative = keys
-    count = lambda truth, answer: sum(row["truth"] == truth and row["answer"] == answer for row in counted)
+
+    def count(truth, answer):
+        return sum(row["truth"] == truth and row["answer"] == answer for row in counted)
+
     counts = {
         "tp": count(positive, positive),
         "fp": count(negative, positive),
@@ -208,30 +211,16 @@ def yes_no(program, browser, real, synthetic, folder):
     counts = summary["row"]["counts"]
     assert shown[0][:5] == ["01", *(str(counts[name]) for name in ("tp", "fp", "tn", "fn"))], shown
     assert shown[1][0] == "x"
-    names = [path.name for side in (real, synthetic) for path in Path(side).rglob("*.png")] + [
-        str(real),
-        str(synthetic),
-    ]
+    names = [path.name for side in (real, synthetic) for path in Path(side).rglob("*.png")]
+    names += [str(real), str(synthetic)]
     check_secrets(browser, address, names)
     code, out = study.interrupt()
     assert code == 0 and "accuracy" in out, (code, out)
 
 
 def pairs(program, browser, real, synthetic, folder):
-    words = [
-        real,
-        synthetic,
-        "--out",
-        folder / "pairs",
-        "--design",
-        "2afc",
-        "--trials",
-        4,
-        "--training",
-        1,
-        "--exposure-ms",
-        LONG_EXPOSURE_MS,
-    ]
+    design = ["--design", "2afc", "--trials", 4, "--training", 1, "--exposure-ms", LONG_EXPOSURE_MS]
+    words = [real, synthetic, "--out", folder / "pairs", *design]
     study = serve_study(program, words)
     browser.open(study.address)
     browser.wait("welcome")
@@ -266,7 +255,8 @@ def montage(browser, folder):
     browser.open("about:blank")
     browser.until("location.href === 'about:blank'")
     browser.run(f"""document.body.style = 'margin: 0; background: #555; display: flex; flex-wrap: wrap; gap: 4px';
-        document.body.innerHTML = '{images}'; Promise.all([...document.images].map((image) => image.decode())).then(() => true)""")
+        document.body.innerHTML = '{images}';
+        Promise.all([...document.images].map((image) => image.decode())).then(() => true)""")
     browser.picture(folder / "pages.png")
 
 

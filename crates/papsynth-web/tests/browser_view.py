@@ -68,7 +68,7 @@ def check_moves(browser):
     middle = browser.middle()
     # Events have integer coordinates.
     at = [int(middle[0]) + 120, int(middle[1]) - 70]
-    under = "(p => [p.px, p.py])(placeOf({ clientX: %s, clientY: %s }))" % tuple(at)
+    under = f"(p => [p.px, p.py])(placeOf({{ clientX: {at[0]}, clientY: {at[1]} }}))"
     before = browser.run(under)
     for _ in range(4):
         browser.wheel(*at, -125)

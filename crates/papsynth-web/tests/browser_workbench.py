@@ -298,8 +298,9 @@ def check_access(browser):
             browser.press("Tab")
         focused = "document.activeElement"
         assert browser.run(f"{focused} === order[{k}]"), browser.run(f"[order[{k}].outerHTML, {focused}.outerHTML]")
+        outlined = f"{focused}.closest('.file') ?? {focused}"
         style = browser.run(
-            f"(({{ outlineStyle, boxShadow }}) => [outlineStyle, boxShadow])(getComputedStyle({focused}.closest('.file') ?? {focused}))"
+            f"(({{ outlineStyle, boxShadow }}) => [outlineStyle, boxShadow])(getComputedStyle({outlined}))"
         )
         assert style != ["none", "none"], browser.run(f"{focused}.outerHTML")
     browser.press("Tab")

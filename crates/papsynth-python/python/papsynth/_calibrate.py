@@ -32,8 +32,8 @@ def calibrate_microscope(
     Parameters
     ----------
     stack : sequence of array_like, optional
-        Three or more planes, each (height, width), equally spaced, on both sides of focus. Gives the blur as a function of
-        defocus and, with ``step_um`` and ``pixel_um``, the aperture of the condenser.
+        Three or more planes, each (height, width), equally spaced, on both sides of focus. Gives the blur as a function
+        of defocus and, with ``step_um`` and ``pixel_um``, the aperture of the condenser.
     edge : array_like, optional
         An image with a straight edge in focus, (height, width). Gives the blur in focus.
     step_um : float, optional
@@ -52,8 +52,9 @@ def calibrate_microscope(
     Returns
     -------
     dict
-        ``microscope``, ``focus`` and ``edge``, as `papsynth calibrate` writes them to ``calibration.json``; ``recipe`` with the
-        sections of a bright-field microscope and ``recipe_gaussian`` with those of the paper's Gaussians, or None.
+        ``microscope``, ``focus`` and ``edge``, as `papsynth calibrate` writes them to ``calibration.json``; ``recipe``
+        with the sections of a bright-field microscope and ``recipe_gaussian`` with those of the paper's Gaussians, or
+        None.
 
     Raises
     ------
@@ -90,7 +91,8 @@ def calibrate_camera(
     Parameters
     ----------
     flats : sequence of sequence of array_like
-        For each light level two or more frames of a uniform field, each (height, width), from nearly dark to saturation.
+        For each light level two or more frames of a uniform field, each (height, width), from nearly dark to
+        saturation.
     darks : sequence of array_like
         Two or more dark frames.
     bits : int, optional
@@ -99,7 +101,8 @@ def calibrate_camera(
     Returns
     -------
     dict
-        ``camera``, as `papsynth calibrate` writes it to ``calibration.json``, and ``recipe`` with the section of a recipe.
+        ``camera``, as `papsynth calibrate` writes it to ``calibration.json``, and ``recipe`` with the section of a
+        recipe.
 
     Raises
     ------

@@ -25,13 +25,14 @@ def _own(given: Any) -> Any:
 class Dataset:
     """A data set that generates images on access.
 
-    An index gives the same sample in every process, so a ``torch.utils.data.DataLoader`` returns the same data with any number
-    of workers. The data set can be pickled. Unpickling fails in a version that gives other images.
+    An index gives the same sample in every process, so a ``torch.utils.data.DataLoader`` returns the same data with any
+    number of workers. The data set can be pickled. Unpickling fails in a version that gives other images.
 
     Parameters
     ----------
     recipe : None, str, os.PathLike or dict
-        As for `papsynth.render`. A file is read again when the data set is unpickled, which fails if the file has changed.
+        As for `papsynth.render`. A file is read again when the data set is unpickled, which fails if the file has
+        changed.
     seed : int
         Seed of the data set.
     length : int

@@ -35,9 +35,10 @@ def _key(recipe, model):
         return path, found.st_mtime_ns, found.st_size
 
     try:
-        model = (
-            None if model is None else json.dumps(model, sort_keys=True) if isinstance(model, dict) else of_file(model)
-        )
+        if isinstance(model, dict):
+            model = json.dumps(model, sort_keys=True)
+        elif model is not None:
+            model = of_file(model)
         if recipe is None:
             return None, model
         if hasattr(recipe, "to_dict"):
@@ -88,8 +89,8 @@ def render(recipe=None, seed: int = 0, index: int = 0, *, model=None, threads: i
     threads : int
         Number of threads; 0 for all processors. The result does not depend on it.
     scene : None, dict, str or os.PathLike
-        Scene to render instead of the one of seed and index: a dictionary such as `Engine.scene` returns, or the path of a
-        JSON file that ``papsynth generate --scenes`` wrote.
+        Scene to render instead of the one of seed and index: a dictionary such as `Engine.scene` returns, or the path
+        of a JSON file that ``papsynth generate --scenes`` wrote.
 
     Returns
     -------

@@ -29,17 +29,18 @@ _OPTIONS = ("formats", "frames_per_shard", "without", "scenes", "threads", "veri
 def shard_count(recipe: Any, frames: int, options: dict[str, Any]) -> int:
     """Return the number of shards. Raises errors of recipe and options before a cluster starts."""
     if unknown := set(options) - set(_OPTIONS):
-        raise TypeError(
-            f"{', '.join(sorted(unknown))}: unknown option; expected {', '.join(_OPTIONS[:-1])} or {_OPTIONS[-1]}"
-        )
+        accepted = f"{', '.join(_OPTIONS[:-1])} or {_OPTIONS[-1]}"
+        raise TypeError(f"{', '.join(sorted(unknown))}: unknown option; expected {accepted}")
     engine(recipe, options.get("model"))
     formats, without = _list(options.get("formats")), _list(options.get("without"))
     return _native.shards(frames, formats, options.get("frames_per_shard"), without)
 
 
 def task_count(shards: int, frames: int, workers: int, tasks: int | None) -> int:
-    """Return the number of tasks of a cluster run. Default: one per shard, but at least 64 frames per task where that leaves
-    four tasks per worker."""
+    """Return the number of tasks of a cluster run.
+
+    Default: one per shard, but at least 64 frames per task where that leaves four tasks per worker.
+    """
     if tasks is not None and tasks < 1:
         raise ValueError(f"tasks: {tasks} is out of range: expected 1 or more")
     return min(shards, max(4 * workers, frames // 64, 1) if tasks is None else tasks)
@@ -94,15 +95,16 @@ def generate(
 ) -> dict[str, int]:
     """Generate the missing frames of a data set, or those of one task.
 
-    A repeated call continues an interrupted one. Several processes may write the same folder. `merge` completes the data set.
+    A repeated call continues an interrupted one. Several processes may write the same folder. `merge` completes the
+    data set.
 
     Parameters
     ----------
     recipe : None, str, os.PathLike or dict
         As for `papsynth.render`.
     out : str or os.PathLike
-        A folder or an object store (``s3://bucket/prefix``, ``gs://``, ``az://``, with keys in the environment): new, empty, or
-        a data set of the same recipe, seed and formats.
+        A folder or an object store (``s3://bucket/prefix``, ``gs://``, ``az://``, with keys in the environment): new,
+        empty, or a data set of the same recipe, seed and formats.
     frames : int
         Total number of frames, of all tasks.
     seed : int
@@ -190,7 +192,7 @@ def verify(out: str | os.PathLike[str], frames: int | None = None) -> dict[str, 
     Returns
     -------
     dict
-        ``"root"``, the root hash of a complete data set, else None; the numbers of ``"frames"`` and ``"files"``; ``"findings"``, a
-        list of (file, message).
+        ``"root"``, the root hash of a complete data set, else None; the numbers of ``"frames"`` and ``"files"``;
+        ``"findings"``, a list of (file, message).
     """
     return _native.verify(os.fspath(out), frames)

@@ -40,8 +40,8 @@ def generate(
     client : dask.distributed.Client, optional
         Default: the client of this process, or a local cluster.
     tasks : int, optional
-        Number of tasks, as n of `--task i/n`. Default: one per shard, but at least 64 frames per task where that leaves four
-        tasks per thread.
+        Number of tasks, as n of `--task i/n`. Default: one per shard, but at least 64 frames per task where that leaves
+        four tasks per thread.
     progress : callable, optional
         Called with the number of complete shards and their total number, including shards of earlier calls.
     **options

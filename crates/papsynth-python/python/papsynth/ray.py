@@ -46,8 +46,8 @@ def generate(
     recipe, out, frames, seed
         As for `papsynth.generate`.
     tasks : int, optional
-        Number of tasks, as n of `--task i/n`. Default: one per shard, but at least 64 frames per task where that leaves four
-        tasks per processor. If a worker dies, its complete shards are kept.
+        Number of tasks, as n of `--task i/n`. Default: one per shard, but at least 64 frames per task where that leaves
+        four tasks per processor. If a worker dies, its complete shards are kept.
     progress : callable, optional
         Called with the number of complete shards and their total number, including shards of earlier calls.
     **options
