@@ -10,14 +10,15 @@ use crate::bench::counts;
 use crate::shell::{self, skipped};
 use crate::steps::{self, Step};
 use crate::workspace::Workspace;
-use crate::{browser, dataset, deps, equations, external, hashes, package, prose, site, supply, test, vectors};
+use crate::{browser, dataset, deps, equations, external, hashes, package, prose, python, site, supply, test, vectors};
 
 /// In order of increasing time. The golden images are part of the tests.
-const STEPS: [Step; 15] = [
+const STEPS: [Step; 16] = [
     ("format", |workspace| shell::run(workspace.cargo().args(["fmt", "--all", "--check"]))),
     ("dependencies", deps::run),
     ("equations", equations::run),
     ("prose", prose::run),
+    ("python lints", |workspace| python::lint(workspace, false)),
     ("reference images", |_| reference_images()),
     ("lints", |workspace| lints(workspace.cargo_light(&["clippy"]))),
     ("documentation", |workspace| documentation(workspace.cargo_light(&["doc"]))),

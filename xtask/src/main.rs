@@ -106,6 +106,14 @@ enum DevCommand {
     Equations,
     /// Checks the line width and the words of comments and Markdown
     Prose,
+    /// Checks format and lints of Python files with ruff
+    ///
+    /// Also the format of Python in Markdown. ruff.toml has the rules. Installs ruff to target/python.
+    LintPython {
+        /// Formats the files, and fixes what ruff can fix
+        #[arg(long)]
+        fix: bool,
+    },
     /// Checks that hot loops are compiled without gathers and scatters
     ///
     /// Builds `papsynth` in release mode and reads its machine code with objdump. xtask/src/vectors.rs lists the
@@ -175,9 +183,9 @@ enum DevCommand {
     Release(release::Release),
     /// Runs all checks for a change, at most 20 minutes on 2 cores from scratch
     ///
-    /// Formatting, lints, the test suite with golden images, documentation, rules of the workspace, instruction counts,
-    /// a data set, independent readers, the study and the viewer in a browser, wasm32. All steps run even if one fails;
-    /// prints the time of each.
+    /// Formatting and lints of Rust and Python, the test suite with golden images, documentation, rules of the
+    /// workspace, instruction counts, a data set, independent readers, the study and the viewer in a browser, wasm32.
+    /// All steps run even if one fails; prints the time of each.
     Ci {
         /// Also crates that take long to build, all readers, licences, packages, Python, clusters, and other
         /// processors. Required before a release and after a change to a covered file. Every run without --full lists
@@ -220,6 +228,7 @@ fn run(command: DevCommand) -> Result<()> {
         DevCommand::Site(options) => site::run(workspace, &options),
         DevCommand::Equations => equations::run(workspace),
         DevCommand::Prose => prose::run(workspace),
+        DevCommand::LintPython { fix } => python::lint(workspace, fix),
         DevCommand::Vectors => vectors::run(workspace),
         DevCommand::Deps => deps::run(workspace),
         DevCommand::External { full } => external::run(workspace, full),

@@ -1,4 +1,4 @@
-//! Python environments below the target folder.
+//! Python environments below the target folder, and checks of Python files.
 
 use std::fs;
 use std::path::PathBuf;
@@ -8,6 +8,9 @@ use anyhow::{Context, Result};
 
 use crate::shell::{self, skipped};
 use crate::workspace::Workspace;
+
+/// One version, because others may format differently.
+const RUFF: &str = "ruff==0.17.6\n";
 
 /// Returns the Python of this machine, for programs that only need its standard library.
 pub(crate) fn system() -> Result<PathBuf> {
@@ -34,6 +37,23 @@ pub(crate) fn environment(workspace: &Workspace, name: &str, requirements: &str)
         .map_err(|error| skipped(format!("Python packages cannot be installed: {error}")))?;
     fs::rename(&list, &stamp).with_context(|| format!("cannot write {}", stamp.display()))?;
     Ok(python)
+}
+
+/// Checks format and lints of all Python files with ruff, or formats and fixes the files. ruff.toml has the rules.
+pub(crate) fn lint(workspace: &Workspace, fix: bool) -> Result<()> {
+    let python = environment(workspace, "ruff", RUFF)?;
+    let ruff = |words: &[&str]| {
+        shell::run(Command::new(&python).args(["-m", "ruff"]).args(words).current_dir(&workspace.root))
+    };
+    if fix {
+        // Fixes may need another format.
+        let lints = ruff(&["check", "--fix"]);
+        return ruff(&["format"]).and(lints);
+    }
+    let format = ruff(&["format", "--check"]);
+    ruff(&["check", "--output-format", "concise"])
+        .and(format)
+        .context("`cargo xtask lint-python --fix` formats and fixes Python files")
 }
 
 /// Returns a subcommand of pip, which prints errors only.
