@@ -73,7 +73,7 @@ def chosen(files, count):
 
 
 def load(name):
-    """Return the fields of a set: image, mask of nuclei separated where they touch, mask of objects that look like nuclei."""
+    """Return the fields of a set: image, mask of nuclei separated where they touch, mask of what looks like nuclei."""
     path, _, count = name.partition(":")
     folder, count = Path(path), int(count) if count else None
     sets = [folder] if (folder / "images").is_dir() else sorted(file.parent for file in folder.glob("*/images"))
@@ -125,7 +125,10 @@ def network():
 
 
 def crop(fields, rng):
-    """Return a random crop, most with a nucleus or an object that looks like one, turned, mirrored, with other light, blur and noise."""
+    """Return a random crop: turned, mirrored, with other light, blur and noise.
+
+    Most crops have a nucleus or an object that looks like one.
+    """
     field = fields[rng.integers(len(fields))]
     shown = field[2 if rng.random() < MIMIC_CROPS else 1]
     for _ in range(12):
@@ -143,7 +146,7 @@ def crop(fields, rng):
 
 
 def train(sets, steps, seed):
-    """Return the network after training on batches of which each set gives an equal part; the last ones are of the last set."""
+    """Return the trained network. Each set gives an equal part of a batch; the last batches are of the last set."""
     rng = np.random.default_rng(seed)
     tf.keras.utils.set_random_seed(seed)
     net = network()
@@ -205,7 +208,7 @@ def away_from_border(mask):
 
 
 def dice(net, image, mask):
-    """Return the Dice coefficient of a mask of nuclei, at each scale of the image. Nuclei at the border are left out."""
+    """Return the Dice coefficient of a mask, at each scale of the image. Nuclei at the border are left out."""
     scores = []
     for scale in SCALES:
         found = ndimage.zoom(probability(net, ndimage.zoom(image, scale, order=1)), 1 / scale, order=1)

@@ -124,8 +124,8 @@ pub(crate) struct Match {
     /// Simulate fewer fields, for a first impression: wider intervals
     #[arg(long)]
     pub(crate) quick: bool,
-    /// Then improve the recipe in this many rounds, so that classifiers tell simulated from real fields less often; half
-    /// of the fields are held out
+    /// Then improve the recipe in this many rounds, so that classifiers tell simulated from real fields less often;
+    /// half of the fields are held out
     #[arg(long, value_name = "ROUNDS", default_value_t = 0, hide_default_value = true, value_parser = integer(0, 10_000_usize))]
     pub(crate) refine: usize,
     /// Model of `papsynth learn`, or class file (TOML), in addition to the built-in classes

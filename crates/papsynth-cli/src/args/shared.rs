@@ -94,8 +94,8 @@ pub(crate) struct FileArgs {
     /// Files to leave out, separated by commas
     #[arg(long, value_name = "FILES", value_parser = extra_parser(), value_delimiter = ',')]
     pub(crate) without: Vec<Extra>,
-    /// Mark nuclei, and objects that look like nuclei, as ignored if their contrast-to-noise ratio in the sharpest plane
-    /// is lower: value 255 in labels/semantic, iscrowd 1 in COCO; 0 ignores none
+    /// Mark nuclei, and objects that look like nuclei, as ignored if their contrast-to-noise ratio in the sharpest
+    /// plane is lower: value 255 in labels/semantic, iscrowd 1 in COCO; 0 ignores none
     #[arg(long, value_name = "RATIO", default_value_t = MIN_DETECTABILITY, value_parser = number(0.0, 1e6))]
     pub(crate) min_detectability: f64,
     /// Write the table of objects as CSV only, without Parquet
