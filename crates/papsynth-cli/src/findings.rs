@@ -28,14 +28,22 @@ pub(crate) fn check(dir: &Path, findings: &[Finding]) -> Result<(), ExitError> {
     }
     let problems = counted(findings.len() as u64, "problem", "problems");
     let needs = |mend: Fix| findings.iter().any(|finding| finding.fix == mend);
-    let repairs: Vec<&str> = [
-        (Fix::Generate, "to repair frames, run the command that wrote them with --verify"),
-        (Fix::Merge, "run `papsynth merge` when all shards are present"),
-        (Fix::Clean, "`papsynth clean --untracked` removes other files"),
+    let dir = dir.display();
+    let repairs: Vec<String> = [
+        (
+            Fix::Merge,
+            "to complete an interrupted run, run the same `papsynth generate` command again; after several tasks, run \
+             `papsynth merge`"
+                .to_owned(),
+        ),
+        (Fix::Generate, "to repair frames, run the command that wrote them with --verify".to_owned()),
+        (Fix::Clean, format!("`papsynth clean {dir}` removes temporary files of interrupted runs")),
+        (Fix::CleanUntracked, format!("`papsynth clean {dir} --untracked` would delete the untracked files")),
     ]
     .into_iter()
-    .filter(|(mend, _)| needs(*mend))
+    // Before the merge, untracked files can be frames of a killed run: the same command writes them again.
+    .filter(|(mend, _)| needs(*mend) && !(*mend == Fix::CleanUntracked && needs(Fix::Merge)))
     .map(|(_, repair)| repair)
     .collect();
-    Err(ExitError::with_help(format!("{}: {problems}", dir.display()), repairs.join("; ")))
+    Err(ExitError::with_help(format!("{dir}: {problems}"), repairs.join("; ")))
 }

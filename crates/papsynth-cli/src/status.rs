@@ -124,10 +124,17 @@ pub(crate) fn verify(args: &Verify) -> Result<(), ExitError> {
 }
 
 pub(crate) fn clean(args: &Clean) -> Result<(), ExitError> {
-    let cleaned = papsynth_dataset::clean(&Location::at(&args.dir)?, args.untracked)?;
-    let (dir, untracked) = (args.dir.display(), counted(cleaned.untracked, "untracked file", "untracked files"));
-    let temporary = counted(cleaned.temporary, "temporary file", "temporary files");
-    exit::print(&format!("{dir}: removed {temporary} and {untracked}\n"))?;
+    let location = Location::at(&args.dir)?;
+    let (cleaned, removed) = match args.dry_run {
+        true => (papsynth_dataset::cleanable(&location, args.untracked)?, "would remove"),
+        false => (papsynth_dataset::clean(&location, args.untracked)?, "removed"),
+    };
+    let files = cleaned.temporary.iter().chain(&cleaned.untracked);
+    let mut text: String = files.map(|path| format!("{removed} {path}\n")).collect();
+    let temporary = counted(cleaned.temporary.len() as u64, "temporary file", "temporary files");
+    let untracked = counted(cleaned.untracked.len() as u64, "untracked file", "untracked files");
+    text.push_str(&format!("{}: {removed} {temporary} and {untracked}\n", args.dir.display()));
+    exit::print(&text)?;
     if cleaned.skipped > 0 {
         let files = counted(cleaned.skipped, "file was", "files were");
         exit::note(format!("{files} not removed: in use, of another user, or with a name that is not UTF-8"));

@@ -11,14 +11,14 @@ use crate::formats::names;
 #[cfg(feature = "zarr")]
 use crate::slide::SlideSet;
 
-/// Counts of the files that [`clean`] removed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+/// The files that [`clean`] removed: paths relative to the data set, sorted.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Cleaned {
     /// Temporary files of killed runs.
-    pub temporary: u64,
+    pub temporary: Vec<String>,
     /// Untracked files: other files that do not belong to the data set.
-    pub untracked: u64,
-    /// Files of both kinds that were not removed: another process writes them, another user owns them, or their names
+    pub untracked: Vec<String>,
+    /// Number of files of both kinds that were not removed: another process writes them, another user owns them, or their names
     /// are not UTF-8.
     pub skipped: u64,
 }
@@ -32,13 +32,22 @@ pub struct Cleaned {
 /// or the data set is not merged and other processes may still write.
 pub fn clean(location: impl Into<Location>, untracked: bool) -> Result<Cleaned, Error> {
     let folder = Folder::new(location);
-    clean_in(&folder, untracked).map_err(|error| folder.named(error))
+    clean_in(&folder, untracked, false).map_err(|error| folder.named(error))
 }
 
-fn clean_in(folder: &Folder, untracked: bool) -> Result<Cleaned, Error> {
+/// Returns what [`clean`] would remove; removes nothing.
+///
+/// # Errors
+/// As [`clean`].
+pub fn cleanable(location: impl Into<Location>, untracked: bool) -> Result<Cleaned, Error> {
+    let folder = Folder::new(location);
+    clean_in(&folder, untracked, true).map_err(|error| folder.named(error))
+}
+
+fn clean_in(folder: &Folder, untracked: bool, is_dry_run: bool) -> Result<Cleaned, Error> {
     let owner = Owner::of(folder)?;
-    let [temporary, skipped] = folder.sweep()?;
-    let mut cleaned = Cleaned { temporary, untracked: 0, skipped };
+    let (temporary, skipped) = folder.sweep(is_dry_run)?;
+    let mut cleaned = Cleaned { temporary, untracked: Vec::new(), skipped };
     if !untracked {
         return Ok(cleaned);
     }
@@ -52,14 +61,18 @@ fn clean_in(folder: &Folder, untracked: bool) -> Result<Cleaned, Error> {
     }
     for name in found {
         if folder.is_remote() || folder.path(&name).symlink_metadata().is_ok() {
-            folder.remove(&name)?;
-            cleaned.untracked += 1;
+            if !is_dry_run {
+                folder.remove(&name)?;
+            }
+            cleaned.untracked.push(name);
         } else {
             cleaned.skipped += 1;
         }
     }
     // An empty folder may have the name of a file of the data set.
-    folder.remove_empty()?;
+    if !is_dry_run {
+        folder.remove_empty()?;
+    }
     Ok(cleaned)
 }
 

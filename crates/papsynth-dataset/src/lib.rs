@@ -17,7 +17,7 @@ mod support;
 mod truth;
 mod write;
 
-pub use clean::{Cleaned, clean};
+pub use clean::{Cleaned, clean, cleanable};
 pub use dataset::{
     Dataset, DatasetInfo, Finding, Fix, FrameLocation, Identity, Manifest, Outcome, Overview, Progress, RgbImage, Run,
     ShardRecord, ShardWriter, Summary, Task, VerifyProgress, VerifyReport, convert, field_files, image_paths, inspect,

@@ -44,15 +44,19 @@ pub(crate) struct Verify {
 #[command(after_help = "\
 Examples:
   papsynth clean fields
-  papsynth clean fields --untracked     also remove files that do not belong to the data set")]
+  papsynth clean fields --untracked --dry-run     list the files that --untracked would delete
+  papsynth clean fields --untracked               also delete files that do not belong to the data set")]
 pub(crate) struct Clean {
     /// Folder or object store of the data set
     #[arg(value_name = "DIR")]
     pub(crate) dir: PathBuf,
-    /// Also remove all files that do not belong to the data set; only after `papsynth merge`, because other tasks may
-    /// still write files before
+    /// Also delete all files that do not belong to the data set, such as your own; only after `papsynth merge`, because
+    /// other tasks may still write files before
     #[arg(long)]
     pub(crate) untracked: bool,
+    /// List the files, and remove none
+    #[arg(long)]
+    pub(crate) dry_run: bool,
 }
 
 /// Write a data set in other formats.

@@ -214,10 +214,32 @@ fn damage_is_found_and_repaired() {
     assert_eq!(run.code, 2);
     let verdict: serde_json::Value = serde_json::from_str(&run.out).unwrap();
     assert_eq!(verdict["findings"][0]["path"], "labels/nucleus/000001.tif");
-    assert_eq!(verdict["findings"][1]["fix"], "clean");
+    assert_eq!(verdict["findings"][1]["fix"], "clean-untracked");
     bench.good(&format!("{command} --verify"));
-    bench.good("clean out --untracked");
+    let run = bench.run("verify out");
+    let hint = "`papsynth clean out --untracked` would delete the untracked files";
+    assert!(run.code == 2 && run.err.contains(hint) && !run.err.contains("--verify"), "{}", run.err);
+    let text = "mine.txt\nout: would remove 0 temporary files and 1 untracked file\n";
+    assert_eq!(bench.good("clean out --untracked --dry-run").out, format!("would remove {text}"));
+    assert_eq!(bench.files("out").len(), before.len() + 1);
+    let text = "mine.txt\nout: removed 0 temporary files and 1 untracked file\n";
+    assert_eq!(bench.good("clean out --untracked").out, format!("removed {text}"));
     assert_eq!(bench.files("out"), before);
+    root(&bench, "out", 3);
+}
+
+#[test]
+fn an_unfinished_data_set_is_completed_by_the_same_command() {
+    let bench = Bench::new("unfinished");
+    let command = format!("generate --out out --frames 3 {TINY}");
+    bench.good(&format!("{command} --task 0/2"));
+    fs::write(bench.path("out/images/.000001.png.0123456789abcdef.tmp"), "half").unwrap();
+    fs::write(bench.path("out/images/000001.png"), "no record yet").unwrap();
+    let run = bench.run("verify out");
+    assert!(run.code == 2 && run.err.contains("run the same `papsynth generate` command again"), "{}", run.err);
+    assert!(run.err.contains("`papsynth clean out` removes temporary files"), "{}", run.err);
+    assert!(!run.err.contains("--untracked"), "{}", run.err);
+    bench.good(&command);
     root(&bench, "out", 3);
 }
 

@@ -101,7 +101,7 @@ impl Dataset {
                 return Err(Error::folder(self.folder.root(), message));
             }
         }
-        self.folder.sweep()?;
+        self.folder.sweep(false)?;
         for (name, bytes) in given {
             self.folder.keep(name, bytes)?;
         }

@@ -40,11 +40,11 @@ impl Finding {
 
     /// A file that does not belong to the data set or slide (`owner`).
     pub(crate) fn untracked(path: &str, owner: &str) -> Self {
-        let message = match is_temporary(last_part(path)) {
-            true => "temporary file of a killed run".to_owned(),
-            false => format!("untracked: does not belong to the {owner}"),
+        let (message, fix) = match is_temporary(last_part(path)) {
+            true => ("temporary file of an interrupted run".to_owned(), Fix::Clean),
+            false => (format!("untracked: does not belong to the {owner}"), Fix::CleanUntracked),
         };
-        Self { path: path.to_owned(), message, fix: Fix::Clean }
+        Self { path: path.to_owned(), message, fix }
     }
 }
 
@@ -61,8 +61,10 @@ pub enum Fix {
     /// `papsynth generate --verify` with the same recipe generates the file again; for a slide `papsynth slide make
     /// --verify`.
     Generate,
-    /// `papsynth clean --untracked` removes the file.
+    /// `papsynth clean` removes the temporary file.
     Clean,
+    /// `papsynth clean --untracked` removes the file.
+    CleanUntracked,
     /// `papsynth merge` after all shards are generated.
     Merge,
 }

@@ -288,6 +288,13 @@ impl Folder {
         Ok(())
     }
 
+    /// Returns the name of a file below the folder.
+    fn name_of(&self, path: &Path) -> String {
+        let below = path.strip_prefix(&self.root).unwrap_or(path);
+        let parts: Vec<_> = below.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect();
+        parts.join("/")
+    }
+
     /// Returns the names of all files, sorted, without those of the desktop ([`is_desktop_file`]). Symbolic links count
     /// as files.
     pub(crate) fn names(&self) -> Result<Vec<String>, Error> {
@@ -302,11 +309,7 @@ impl Folder {
                 if is_folder || is_desktop_file(&entry.file_name().to_string_lossy()) {
                     continue;
                 }
-                let below = entry.path();
-                let below = below.strip_prefix(&self.root);
-                let below = below.expect("entries of subfolders are below the root");
-                let parts: Vec<_> = below.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect();
-                found.push(parts.join("/"));
+                found.push(self.name_of(&entry.path()));
             }
         }
         found.sort();
@@ -339,10 +342,10 @@ impl Folder {
         entries.map(name).collect::<Result<_, _>>().map_err(Error::io("read", &path))
     }
 
-    /// Removes temporary files of killed processes. Returns the number of removed and of skipped files. Skipped are
-    /// files that another process has locked or that may not be opened.
-    pub(crate) fn sweep(&self) -> Result<[u64; 2], Error> {
-        let [mut removed, mut skipped] = [0; 2];
+    /// Removes temporary files of killed processes. Returns the names of removed files, sorted, and the number of
+    /// skipped files: those that another process has locked or that may not be opened. A dry run removes nothing.
+    pub(crate) fn sweep(&self, is_dry_run: bool) -> Result<(Vec<String>, u64), Error> {
+        let (mut removed, mut skipped) = (Vec::new(), 0);
         for path in self.folders()? {
             for entry in entries(&path)? {
                 if !is_temporary(&entry.file_name().to_string_lossy()) {
@@ -354,12 +357,16 @@ impl Folder {
                     || File::options().write(true).open(entry.path()).ok().filter(|file| file.try_lock().is_ok());
                 // The lock is held until the file is removed, so that no other process can lock it in between.
                 let lock = if is_link { None } else { open() };
-                let is_gone = (is_link || lock.is_some()) && fs::remove_file(entry.path()).is_ok();
-                removed += u64::from(is_gone);
-                skipped += u64::from(!is_gone && entry.path().symlink_metadata().is_ok());
+                let is_gone = (is_link || lock.is_some()) && (is_dry_run || fs::remove_file(entry.path()).is_ok());
+                if is_gone {
+                    removed.push(self.name_of(&entry.path()));
+                } else {
+                    skipped += u64::from(entry.path().symlink_metadata().is_ok());
+                }
             }
         }
-        Ok([removed, skipped])
+        removed.sort();
+        Ok((removed, skipped))
     }
 
     /// Syncs the folders of these files, so that their names survive a power failure.

@@ -58,7 +58,7 @@ impl SlideSet {
                 return Err(Error::folder(path, message));
             }
         }
-        set.folder.sweep()?;
+        set.folder.sweep(false)?;
         set.folder.keep(HEAD, &text)?;
         set.folder.keep(names::RECIPE, recipe.as_bytes())?;
         set.folder.keep(names::MODEL, model.as_bytes())?;

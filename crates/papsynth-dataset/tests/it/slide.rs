@@ -176,9 +176,10 @@ fn every_damage_is_found_and_repaired() {
     fs::write(folder.0.join("objects/other.csv"), "x").unwrap();
     fs::write(folder.0.join("objects/.0000-0000.csv.0123456789abcdef.tmp"), "x").unwrap();
     let found = set.verify().unwrap();
-    assert!(found.len() == 2 && found.iter().all(|finding| finding.fix == Fix::Clean), "{found:?}");
-    assert_eq!(clean(&folder.0, false).unwrap(), Cleaned { temporary: 1, untracked: 0, skipped: 0 });
-    assert_eq!(clean(&folder.0, true).unwrap(), Cleaned { temporary: 0, untracked: 1, skipped: 0 });
+    assert!(found.len() == 2 && found[0].fix == Fix::Clean && found[1].fix == Fix::CleanUntracked, "{found:?}");
+    let (temporary, untracked) = (vec![found[0].path.clone()], vec![found[1].path.clone()]);
+    assert_eq!(clean(&folder.0, false).unwrap(), Cleaned { temporary, untracked: Vec::new(), skipped: 0 });
+    assert_eq!(clean(&folder.0, true).unwrap(), Cleaned { temporary: Vec::new(), untracked, skipped: 0 });
     assert_eq!(set.verify().unwrap(), []);
     // A reformatted record counts as changed.
     for name in ["shards/0000-0000.json", "upper.json"] {

@@ -193,7 +193,7 @@ fn damage_in_a_store_is_found_and_repaired() {
     }
     store.0.lock().unwrap().files.insert("thesis.tex".to_owned(), b"years of work".to_vec());
     assert!(verify(store.home(), None).unwrap().findings.iter().any(|finding| finding.path == "thesis.tex"));
-    assert_eq!(clean(store.home(), true).unwrap().untracked, 1);
+    assert_eq!(clean(store.home(), true).unwrap().untracked.len(), 1);
     assert_eq!(store.files(), expected);
     let dataset = Dataset::open(store.home()).unwrap();
     let missing: Vec<u64> =

@@ -3,7 +3,7 @@
 use std::fs;
 
 use papsynth::model::Model;
-use papsynth_dataset::{Dataset, DatasetInfo, Fix, Format, Layout, clean, verify};
+use papsynth_dataset::{Dataset, DatasetInfo, Fix, Format, Layout, clean, cleanable, verify};
 
 use super::{fill, is_found, look, make};
 use crate::support::{SEED, Scratch, contents, frame, recipe};
@@ -81,11 +81,15 @@ fn every_missing_or_untracked_file_is_found() {
     fs::write(scratch.join("labels/.000009.tif.0123.tmp"), "half").unwrap();
     let found = look(scratch.path()).findings;
     let untracked: Vec<(&str, Fix)> = found.iter().map(|finding| (finding.path.as_str(), finding.fix)).collect();
-    assert_eq!(untracked, [("images/notes.txt", Fix::Clean), ("labels/.000009.tif.0123.tmp", Fix::Clean)]);
+    assert_eq!(untracked, [("images/notes.txt", Fix::CleanUntracked), ("labels/.000009.tif.0123.tmp", Fix::Clean)]);
+    let planned = cleanable(scratch.path(), true).unwrap();
+    assert_eq!(planned.untracked, ["images/notes.txt"]);
+    assert!(scratch.join("images/notes.txt").exists() && scratch.join("labels/.000009.tif.0123.tmp").exists());
     let cleaned = clean(scratch.path(), false).unwrap();
-    assert_eq!((cleaned.temporary, cleaned.untracked), (1, 0));
+    assert_eq!(cleaned.temporary, ["labels/.000009.tif.0123.tmp"]);
+    assert_eq!((&cleaned.temporary, cleaned.untracked.len()), (&planned.temporary, 0));
     assert!(scratch.join("images/notes.txt").exists());
-    assert_eq!(clean(scratch.path(), true).unwrap().untracked, 1);
+    assert_eq!(clean(scratch.path(), true).unwrap(), papsynth_dataset::Cleaned { temporary: Vec::new(), ..planned });
     assert!(look(scratch.path()).root.is_some());
     assert!(verify(scratch.path(), Some(0..9)).unwrap().findings[0].message.contains("frame"));
 }
@@ -96,7 +100,7 @@ fn a_folder_with_the_name_of_a_file_is_found_and_replaced() {
     let before = contents(scratch.path());
     let name = "images/000001.png";
     let place = scratch.join(name);
-    let repair = |untracked: Option<u64>| {
+    let repair = |untracked: Option<&[&str]>| {
         assert!(is_found(&look(scratch.path()), name));
         if let Some(untracked) = untracked {
             assert_eq!(clean(scratch.path(), true).unwrap().untracked, untracked);
@@ -110,10 +114,10 @@ fn a_folder_with_the_name_of_a_file_is_found_and_replaced() {
     fs::create_dir(&place).unwrap();
     repair(None);
     fs::create_dir_all(place.join("deep")).unwrap();
-    repair(Some(0));
+    repair(Some(&[]));
     fs::create_dir_all(place.join("deep")).unwrap();
     fs::write(place.join("deep/notes.txt"), "mine").unwrap();
-    repair(Some(1));
+    repair(Some(&["images/000001.png/deep/notes.txt"]));
 }
 
 #[test]
@@ -289,7 +293,7 @@ fn files_of_the_desktop_are_ignored() {
         fs::write(scratch.join(name), "view settings").unwrap();
     }
     assert!(look(scratch.path()).root.is_some(), "{:?}", look(scratch.path()));
-    assert_eq!(clean(scratch.path(), true).unwrap().untracked, 0);
+    assert!(clean(scratch.path(), true).unwrap().untracked.is_empty());
     // A folder with nothing else counts as empty.
     let other = Scratch::new("desktop-empty");
     fs::write(other.join(".DS_Store"), "view settings").unwrap();
@@ -311,7 +315,7 @@ fn a_damaged_record_is_one_finding_and_its_files_are_not_untracked() {
         fs::write(scratch.join("notes.txt"), "mine").unwrap();
         let report = look(scratch.path());
         let found: Vec<(&str, Fix)> = report.findings.iter().map(|f| (f.path.as_str(), f.fix)).collect();
-        assert_eq!(found, [("notes.txt", Fix::Clean), ("shards/000000.json", Fix::Generate)], "{report:?}");
+        assert_eq!(found, [("notes.txt", Fix::CleanUntracked), ("shards/000000.json", Fix::Generate)], "{report:?}");
     }
 }
 
