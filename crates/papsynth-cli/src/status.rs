@@ -20,15 +20,16 @@ pub(crate) fn run(args: &Status) -> Result<(), ExitError> {
     }
     let dataset = Dataset::open(&Location::at(&args.dir)?)?;
     let merged = dataset.merged_frames()?;
-    let Some(frames) = args.frames.or((merged > 0).then_some(merged)) else {
+    let Some(frames) = args.frames.map(|frames| 0..frames).or((!merged.is_empty()).then_some(merged)) else {
         return Err(ExitError::with_help(
             "--frames is missing".to_owned(),
             "give the number of frames of the complete data set; slides and merged data sets record it",
         ));
     };
-    let missing = missing_shards(&dataset, 0..frames, Check::Sizes)?;
-    let all = frames.div_ceil(dataset.layout().frames_per_shard);
-    let finish = format!("papsynth merge {} --frames {frames}", args.dir.display());
+    let missing = missing_shards(&dataset, frames.clone(), Check::Sizes)?;
+    let each = dataset.layout().frames_per_shard;
+    let all = frames.end.div_ceil(each) - frames.start / each;
+    let finish = format!("papsynth merge {} --frames {}", args.dir.display(), frames.end);
     print_status(args, &missing, all, (!dataset.is_finished()?).then_some(&finish))
 }
 
@@ -117,6 +118,9 @@ pub(crate) fn verify(args: &Verify) -> Result<(), ExitError> {
     } else if let Some(root) = &report.root {
         let (frames, files) = (counted(report.frames, "frame", "frames"), counted(report.files, "file", "files"));
         exit::print(&format!("{dir}: no problems found, {frames} in {files}\nroot {root}\n"))?;
+        if !report.not_generated.is_empty() {
+            exit::note(format!("frames that were not generated: {}", listed(&report.not_generated)));
+        }
     } else {
         print_findings(&report.findings)?;
     }

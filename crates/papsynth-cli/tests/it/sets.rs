@@ -244,6 +244,26 @@ fn an_unfinished_data_set_is_completed_by_the_same_command() {
 }
 
 #[test]
+fn a_data_set_of_a_range_is_complete() {
+    let bench = Bench::new("range");
+    bench.good(&format!("generate --out rng --range 3..5 {TINY}"));
+    let run = bench.good("verify rng");
+    assert!(run.out.contains("no problems found, 2 frames"), "{}", run.out);
+    assert!(run.err.contains("frames that were not generated: 0-2"), "{}", run.err);
+    assert!(bench.good("status rng").out.ends_with("finished\n"));
+    // --frames requires all frames from 0, and a lost record is still found.
+    assert!(bench.run("verify rng --frames 5").out.contains("missing: frames 0–2"));
+    fs::remove_file(bench.path("rng/shards/000004.json")).unwrap();
+    let run = bench.run("verify rng");
+    assert!(run.code == 2 && run.out.contains("missing"), "{}", run.out);
+    bench.good(&format!("generate --out rng --range 3..5 {TINY} --quiet"));
+    bench.good(&format!("generate --out rng --range 7..8 {TINY} --quiet"));
+    let run = bench.good("verify rng");
+    assert!(run.err.contains("frames that were not generated: 0-2,5-6"), "{}", run.err);
+    assert!(bench.good("status rng").out.contains("missing shards: 5-6"));
+}
+
+#[test]
 fn conversion_changes_only_the_format() {
     let bench = Bench::new("convert");
     bench.good(&format!("generate --out out --frames 3 {TINY}"));

@@ -10,7 +10,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::manifest::Manifest;
-use super::record::{Identity, recorded_shards};
+use super::record::{Identity, read_record, recorded_shards};
 use super::rgb_image::Thumbnails;
 use crate::bytes::sha256;
 use crate::error::{Error, InputError};
@@ -107,12 +107,24 @@ impl Dataset {
         self.layout.images_of(self.identity.seed, shard, frame)
     }
 
-    /// Number of frames that [`finish`](Self::finish) merged; 0 before the first merge.
+    /// Returns the range of frames that [`finish`](Self::finish) merged; an empty range before the first merge. If
+    /// records are missing, the range begins at 0.
     ///
     /// # Errors
-    /// If the manifest cannot be read.
-    pub fn merged_frames(&self) -> Result<u64, Error> {
-        Ok(Manifest::read(&self.folder)?.frames)
+    /// If the manifest or the last record cannot be read.
+    pub fn merged_frames(&self) -> Result<Range<u64>, Error> {
+        let Manifest { frames, shards, .. } = Manifest::read(&self.folder)?;
+        let recorded = recorded_shards(&self.folder)?;
+        let (Some(&first), Some(&last)) = (recorded.first(), recorded.last()) else { return Ok(0..frames) };
+        if recorded.len() as u64 != shards {
+            return Ok(0..frames);
+        }
+        let end = match read_record(&self.folder, last) {
+            Ok(record) => record.frames.last().map_or(frames, |frame| frame.index + 1),
+            Err(Error::Input { .. }) => self.frames_of_shard(last).end,
+            Err(failure) => return Err(failure),
+        };
+        Ok(self.frames_of_shard(first).start..end)
     }
 
     /// Returns the numbers of all recorded shards, sorted.

@@ -31,6 +31,8 @@ pub struct VerifyReport {
     pub frames: u64,
     /// Number of files of the data set.
     pub files: u64,
+    /// Frames before the last one that a merged data set does not contain: it was generated from other ranges.
+    pub not_generated: Vec<Range<u64>>,
     /// All findings, sorted by path.
     pub findings: Vec<Finding>,
 }
@@ -45,8 +47,8 @@ pub struct VerifyProgress {
 }
 
 /// Verifies a data set: reads every file, checks that the files of each shard are consistent, and recomputes the merged
-/// files. With `expected`, every frame of that range must exist; otherwise every frame up to the last. Files of the
-/// desktop, such as `.DS_Store`, are ignored.
+/// files. With `expected`, every frame of that range must exist; otherwise every frame that was merged, and before the
+/// merge every frame up to the last. Files of the desktop, such as `.DS_Store`, are ignored.
 ///
 /// # Errors
 /// If there is no data set, or a file cannot be read.
@@ -80,7 +82,7 @@ fn verify_in(
         // A broken manifest is the only finding: without it, nothing else can be checked.
         Err(Error::Input { problem, path }) if path == folder.shown().join(names::MANIFEST) => {
             let findings = vec![Finding::damaged(names::MANIFEST, problem.to_string())];
-            return Ok(VerifyReport { root: None, frames: 0, files: 1, findings });
+            return Ok(VerifyReport { root: None, frames: 0, files: 1, not_generated: Vec::new(), findings });
         }
         Err(error) => return Err(error),
     };
@@ -120,8 +122,14 @@ fn verify_in(
     if !unreadable.is_empty() {
         listed.extend(listed_files(folder, |shard| unreadable.contains(&shard))?);
     }
+    // A merged data set that lists exactly these shards is complete, whatever ranges it was generated from.
+    let is_merged = expected.is_none() && closed == recorded.len() as u64 && !merged.is_empty();
     let expected = expected.unwrap_or_else(|| 0..present.last().map_or(0, |last: &u64| last + 1).max(known));
-    for gap in gaps(&present, &expected) {
+    let (not_generated, missing) = match is_merged {
+        true => (gaps(&present, &(0..expected.end)), Vec::new()),
+        false => (Vec::new(), gaps(&present, &expected)),
+    };
+    for gap in missing {
         let message = match gap.end - gap.start {
             1 => format!("missing: frame {}", gap.start),
             _ => format!("missing: frames {}–{}", gap.start, gap.end - 1),
@@ -167,7 +175,7 @@ fn verify_in(
     findings.extend(there.iter().filter(|path| !is_known(path)).map(|path| Finding::untracked(path, "data set")));
     findings.sort();
     let root = findings.is_empty().then_some(manifest.sha256);
-    Ok(VerifyReport { root, frames, files, findings })
+    Ok(VerifyReport { root, frames, files, not_generated, findings })
 }
 
 /// Returns the shard that a file belongs to by its name: `images/000003.png` belongs to the shard of frame 3.
