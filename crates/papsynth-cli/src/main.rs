@@ -139,7 +139,8 @@ fn init(args: &Init) -> Result<(), ExitError> {
         Some(path) => {
             let out = OutputFile::check(path, Kind::Recipe, args.force)?;
             out.write(recipe()?.as_bytes())?;
-            exit::print(&format!("{}: recipe written; `papsynth preview` shows one of its fields\n", path.display()))
+            let path = path.display();
+            exit::print(&format!("{path}: recipe written; `papsynth preview {path}` shows one of its fields\n"))
         }
     }
 }

@@ -83,7 +83,7 @@ pub(crate) fn run(args: &args::Match) -> Result<(), ExitError> {
     }
     recipe_file.write(fit.to_toml().as_bytes())?;
     let out = args.out.display();
-    exit::print(&format!("{text}\n{out}: use it with papsynth generate {out}\n"))
+    exit::print(&format!("{text}\n{out}: recipe written; `papsynth preview {out}` shows one of its fields\n"))
 }
 
 /// The pixel size: of `--pixel-um`, or as recorded in all files.

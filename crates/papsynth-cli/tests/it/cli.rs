@@ -216,7 +216,7 @@ fn every_preset_prints_a_recipe_that_reads_back() {
     let changed: toml::Table = changed.parse().unwrap();
     assert_eq!(changed["cells"]["lsil"]["count"].as_integer(), Some(3));
     assert_eq!(bench.run("init --set optics.na=7").code, 2);
-    assert!(bench.good("init --out mine.toml").out.contains("mine.toml: recipe written"));
+    assert!(bench.good("init --out mine.toml").out.contains("written; `papsynth preview mine.toml` shows"));
     fs::write(bench.path("mine.toml"), "edited").unwrap();
     let again = bench.run("init --out mine.toml");
     assert!(again.code == 2 && again.err.contains("--force"), "{}", again.err);

@@ -19,7 +19,8 @@ fn the_recipe_of_a_match_generates_fields() {
     let outcome = bench
         .good("match real --out mine.toml --report mine.json --page mine.html --simulations 60 --seed 1 --threads 2");
     assert!(outcome.out.starts_with("3 fields, "), "{}", outcome.out);
-    assert!(outcome.out.ends_with("\nmine.toml: use it with papsynth generate mine.toml\n"), "{}", outcome.out);
+    let suggested = "\nmine.toml: recipe written; `papsynth preview mine.toml` shows one of its fields\n";
+    assert!(outcome.out.ends_with(suggested), "{}", outcome.out);
     assert!(outcome.err.contains("of 290, about") && outcome.err.contains("290 of 290"), "{}", outcome.err);
     let toml = fs::read_to_string(bench.path("mine.toml")).unwrap();
     assert!(toml.starts_with("# Matched to 3 fields with ") && toml.contains("# measured: "), "{toml}");
