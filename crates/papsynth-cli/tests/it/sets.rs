@@ -82,7 +82,11 @@ fn files_that_are_left_out_are_not_written_and_not_missed() {
     root(&bench, "some", 3);
     // Another choice is another layout.
     let run = bench.run(&format!("generate --out some --frames 3 {TINY}"));
-    assert!(run.code == 2 && run.err.contains("without noise-free, layers, semantic, contact-sheet"), "{}", run.err);
+    assert!(
+        run.code == 2 && run.err.contains("with --without noise-free,layers,semantic,contact-sheet; choose"),
+        "{}",
+        run.err
+    );
     for (options, expected) in [
         ("--without noise", "noise-free"),
         ("--without noise-free --format cellpose", "cellpose does not contain it"),
@@ -264,6 +268,20 @@ fn a_data_set_of_a_range_is_complete() {
 }
 
 #[test]
+fn the_changed_option_or_setting_is_named() {
+    let bench = Bench::new("changed");
+    let command = format!("generate --out out --frames 1 {TINY}");
+    bench.good(&command);
+    for (more, expected) in [
+        ("--scenes", "was written without --scenes; choose another folder, or leave it out"),
+        ("--set light.kind=colour", "`light.kind` is \"monochrome\" in the existing recipe"),
+    ] {
+        let run = bench.run(&format!("{command} {more}"));
+        assert!(run.code == 2 && run.err.contains(expected), "{}", run.err);
+    }
+}
+
+#[test]
 fn conversion_changes_only_the_format() {
     let bench = Bench::new("convert");
     bench.good(&format!("generate --out out --frames 3 {TINY}"));
@@ -271,7 +289,7 @@ fn conversion_changes_only_the_format() {
     bench.good("convert out --out converted --format qupath,stardist --flatten drop");
     assert_eq!(bench.files("direct"), bench.files("converted"));
     let run = bench.run("convert out --out converted --format yolo-seg");
-    assert!(run.code == 2 && run.err.contains("was written with another layout"), "{}", run.err);
+    assert!(run.code == 2 && run.err.contains("with --format stardist,qupath, not yolo-seg"), "{}", run.err);
     assert_eq!(bench.run("convert out --out other").code, 2);
     assert_eq!(bench.run("convert none --out other --format cellpose").code, 2);
 }

@@ -151,11 +151,8 @@ impl Dataset {
             Some(("has another model".to_owned(), "use its model.json"))
         } else if existing.seed != given.seed {
             Some((format!("has seed {}, not {}", existing.seed, given.seed), "use its seed"))
-        } else if manifest.layout != self.layout {
-            let (existing, given) = (manifest.layout, &self.layout);
-            Some((format!("was written with another layout ({existing}), not {given}"), "use its layout"))
         } else {
-            None
+            manifest.layout.difference(&self.layout)
         };
         difference.map_or(Ok(()), |(difference, remedy)| {
             let message = format!("the data set in this folder {difference}; choose another folder, or {remedy}");

@@ -97,20 +97,24 @@ pub(crate) fn recipe_difference(folder: &Folder, expected: &str, recipe: &str) -
     }
     let read = |text: &str| toml::from_str::<toml::Table>(text).ok();
     let both = existing.and_then(|existing| read(&existing)).zip(read(recipe));
-    let difference = both.and_then(|(existing, given)| difference("", &existing, &given));
+    // A setting that only one recipe has is the consequence of another one, such as `kind`.
+    let difference = both.and_then(|(existing, given)| {
+        difference("", &existing, &given, false).or_else(|| difference("", &existing, &given, true))
+    });
     difference.map_or_else(String::new, |difference| format!(" ({difference})"))
 }
 
-/// Returns the first field in which two recipes differ, with its values.
-fn difference(section: &str, existing: &toml::Table, given: &toml::Table) -> Option<String> {
-    let names: BTreeSet<&String> = existing.keys().chain(given.keys()).collect();
-    names.into_iter().find_map(|name| {
+/// Returns the first field in which two recipes differ, with its values; with `unset`, also a field of one of them.
+fn difference(section: &str, existing: &toml::Table, given: &toml::Table, unset: bool) -> Option<String> {
+    let names: BTreeSet<(bool, &String)> =
+        existing.keys().chain(given.keys()).map(|name| (name != "kind", name)).collect();
+    names.into_iter().find_map(|(_, name)| {
         let field = if section.is_empty() { name.clone() } else { format!("{section}.{name}") };
         match (existing.get(name), given.get(name)) {
             (Some(toml::Value::Table(existing)), Some(toml::Value::Table(given))) => {
-                difference(&field, existing, given)
+                difference(&field, existing, given, unset)
             }
-            (existing, given) if existing == given => None,
+            (existing, given) if existing == given || (!unset && (existing.is_none() || given.is_none())) => None,
             (existing, given) => {
                 let shown = |value: Option<&toml::Value>| value.map_or("unset".to_owned(), toml::Value::to_string);
                 Some(format!(

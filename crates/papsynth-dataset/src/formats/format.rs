@@ -308,6 +308,38 @@ impl Layout {
         })
     }
 
+    /// Returns the first option of `papsynth generate` in which the layout of a data set differs from `given`, and the
+    /// remedy.
+    pub(crate) fn difference(&self, given: &Self) -> Option<(String, &'static str)> {
+        if self.objects_parquet && !HAS_PARQUET {
+            let message = "was written with objects also as Parquet".to_owned();
+            return Some((message, "use a build of papsynth with `--features parquet`"));
+        }
+        let list = |names: Vec<&str>| (!names.is_empty()).then(|| names.join(","));
+        let options = |layout: &Self| {
+            [
+                ("--format", list(layout.formats.iter().map(|format| format.name()).collect())),
+                ("--frames-per-shard", Some(layout.frames_per_shard.to_string())),
+                ("--flatten", Some(layout.flatten.name().to_owned())),
+                ("--min-detectability", Some(layout.min_detectability.to_string())),
+                ("--without", list(layout.without.iter().map(|extra| extra.name()).collect())),
+                ("--scenes", layout.scenes.then(String::new)),
+                ("--no-parquet", (!layout.objects_parquet).then(String::new)),
+            ]
+        };
+        let pairs = options(self).into_iter().zip(options(given));
+        pairs.into_iter().find_map(|((name, existing), (_, given))| match (existing, given) {
+            (existing, given) if existing == given => None,
+            (Some(existing), Some(given)) => {
+                Some((format!("was written with {name} {existing}, not {given}"), "use the original value"))
+            }
+            (Some(existing), None) => {
+                Some((format!("was written with {}", format!("{name} {existing}").trim_end()), "add this option"))
+            }
+            (None, _) => Some((format!("was written without {name}"), "leave it out")),
+        })
+    }
+
     /// Checks a layout that was read from a file.
     pub(crate) fn check(&self) -> Result<(), InputError> {
         let message = match self.frames_per_shard {
@@ -401,6 +433,30 @@ mod tests {
             let message = layout.refusal().unwrap();
             assert!(message.contains(expected) && message.contains(without.name()), "{message}");
             assert!(layout.check().is_err());
+        }
+    }
+
+    #[test]
+    fn the_first_option_that_differs_is_named() {
+        let base = Layout { objects_parquet: HAS_PARQUET, ..Layout::default() };
+        let difference = |existing: &Layout, given: &Layout| existing.difference(given).map(|(message, _)| message);
+        for (other, with, without) in [
+            (Layout { scenes: true, ..base.clone() }, "with --scenes", "without --scenes"),
+            (base.clone().without([Extra::Layers]), "with --without layers", "without --without"),
+            (
+                Layout { frames_per_shard: 4, ..base.clone() },
+                "with --frames-per-shard 4, not 1",
+                "with --frames-per-shard 1, not 4",
+            ),
+            (
+                Layout { formats: vec![Format::Cellpose], ..base.clone() },
+                "with --format cellpose, not folder",
+                "with --format folder, not cellpose",
+            ),
+        ] {
+            assert_eq!(difference(&other, &base).unwrap(), format!("was written {with}"));
+            assert_eq!(difference(&base, &other).unwrap(), format!("was written {without}"));
+            assert_eq!(difference(&other, &other), None);
         }
     }
 
