@@ -27,7 +27,9 @@ pub(crate) fn run(args: &Generate) -> Result<(), ExitError> {
     let seed = args.engine.seed;
     let frames = args.indices();
     let count = frames.end - frames.start;
-    let (layout, chosen) = args.layout.layout(frames.end);
+    // A damaged manifest is reported, or repaired, by `create_or_resume`.
+    let existing = Dataset::open(&home).ok();
+    let (layout, chosen) = args.layout.layout_in(existing.as_ref().map(Dataset::layout), frames.end);
     if let Some(message) = layout.refusal_of(&frames).or_else(|| layout.refusal()) {
         return Err(ExitError::input(message));
     }

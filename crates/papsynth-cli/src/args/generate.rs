@@ -14,7 +14,7 @@ use crate::task::TaskArgs;
 ///
 /// The same recipe, model and seed give the same pixels, labels and tables on any machine, for any number of threads
 /// and any split of the frames into ranges or tasks. Run the same command again to write missing frames; complete
-/// frames are not written again.
+/// frames are not written again. Without --format, frames are added to a data set in its formats.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("which").required(true).args(["frames", "range"]), after_help = "\
 Examples:

@@ -115,6 +115,18 @@ impl LayoutArgs {
         let formats = if self.format.is_empty() { vec![default] } else { self.format.clone() };
         (Layout { scenes: self.scenes, ..self.files.layout(formats) }, many)
     }
+
+    /// The same for frames that are added to a data set, whose formats and shards are the default.
+    pub(crate) fn layout_in(&self, existing: Option<&Layout>, frames: u64) -> (Layout, bool) {
+        match existing {
+            Some(existing) if self.format.is_empty() => {
+                let mut layout = self.files.layout(existing.formats.clone());
+                layout.frames_per_shard = self.files.frames_per_shard.unwrap_or(existing.frames_per_shard);
+                (Layout { scenes: self.scenes, ..layout }, false)
+            }
+            _ => self.layout(frames),
+        }
+    }
 }
 
 impl FileArgs {

@@ -282,6 +282,20 @@ fn the_changed_option_or_setting_is_named() {
 }
 
 #[test]
+fn frames_are_added_in_the_formats_of_the_data_set() {
+    let bench = Bench::new("added");
+    bench.good(&format!("generate --out out --frames 2 --format cellpose --frames-per-shard 2 {TINY}"));
+    bench.good(&format!("generate --out out --range 20000..20001 {TINY} --quiet"));
+    assert!(bench.good("inspect out").out.contains("frames      3\n"));
+    // A new data set of a range above 10000 is in shards of 256 frames.
+    let range = format!("generate --out other --range 20000..20002 {TINY}");
+    let run = bench.run(&range);
+    assert!(run.code == 2 && run.err.contains("or use --format folder, or --frames-per-shard 1"), "{}", run.err);
+    bench.good(&format!("{range} --format folder"));
+    bench.good(&range);
+}
+
+#[test]
 fn conversion_changes_only_the_format() {
     let bench = Bench::new("convert");
     bench.good(&format!("generate --out out --frames 3 {TINY}"));
