@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use crate::args;
 use crate::exit::{self, ErrorReport, ExitError};
-use crate::output_file::{Kind, check_folder};
+use crate::output_file::{Kind, check_folder, check_writable};
 use crate::report::Bar;
 use crate::setup::pool;
 use crate::words::counted;
@@ -41,6 +41,7 @@ type Side = Vec<(f64, FieldFile)>;
 
 pub(crate) fn run(args: &args::Judge) -> Result<(), ExitError> {
     check_folder(&args.out, &[PAGE, NUMBERS])?;
+    check_writable(&args.out.join(PAGE.0))?;
     let (real, synthetic) = sides(args)?;
     // The common pixel size is the largest.
     let pixel_um = real.iter().chain(&synthetic).map(|(um, _)| *um).fold(0.0, f64::max);
