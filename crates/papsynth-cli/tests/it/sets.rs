@@ -296,6 +296,21 @@ fn frames_are_added_in_the_formats_of_the_data_set() {
 }
 
 #[test]
+fn a_folder_that_does_not_exist_is_named() {
+    let bench = Bench::new("no-folder");
+    fs::write(bench.path("file"), "x").unwrap();
+    fs::create_dir(bench.path("empty")).unwrap();
+    for (dir, expected) in
+        [("none", "none: no such folder"), ("file", "file: is a file"), ("empty", "empty: contains no data set")]
+    {
+        for words in ["verify", "status", "inspect", "clean", "merge --frames 1"] {
+            let run = bench.run(&format!("{words} {dir}"));
+            assert!(run.code == 2 && run.err.contains(expected), "{words} {dir}: {}", run.err);
+        }
+    }
+}
+
+#[test]
 fn conversion_changes_only_the_format() {
     let bench = Bench::new("convert");
     bench.good(&format!("generate --out out --frames 3 {TINY}"));

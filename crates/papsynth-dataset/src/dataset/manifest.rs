@@ -109,7 +109,12 @@ impl Manifest {
         let path = folder.inside(names::MANIFEST)?;
         let file = File::open(&path).map_err(|e| match e.kind() {
             io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
-                Error::folder(folder.root(), "contains no data set: manifest.json is missing")
+                let message = match (folder.is_remote() || folder.root().is_dir(), folder.root().exists()) {
+                    (true, _) => "contains no data set: manifest.json is missing",
+                    (false, true) => "is a file; expected the folder of a data set",
+                    (false, false) => "no such folder; expected the folder of a data set",
+                };
+                Error::folder(folder.root(), message)
             }
             _ => Error::io("read", &path)(e),
         })?;
