@@ -36,7 +36,7 @@ impl<'a> OutputFile<'a> {
         if matches!(kind, Kind::Image) {
             check_ending(path)?;
         }
-        if path.is_dir() {
+        if path.is_dir() || path.to_string_lossy().ends_with(std::path::is_separator) {
             let message = format!("{}: is a folder; expected the name of a file", path.display());
             return Err(ExitError::input(message));
         }
