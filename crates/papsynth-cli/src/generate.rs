@@ -112,7 +112,7 @@ fn fit(args: &Generate, setup: &Setup, few: Option<usize>, layout: &Layout) -> R
     let wanted = (few.map_or(setup.threads, |_| 1), few.is_some() && setup.threads > 1);
     memory::fit(&need, setup.threads, wanted, args.max_memory, |Budget { bytes, source }| {
         let help = "smaller fields, fewer cells, one plane, monochrome light and less oversampling need less memory; \
-                    --max-memory sets another limit";
+                    --max-memory sets another limit, for example 2GiB";
         ExitError::with_help(format!("{} ({source})", need.too_large(recipe, bytes)), help)
     })
 }

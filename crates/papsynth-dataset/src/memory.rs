@@ -189,10 +189,16 @@ impl MemoryEstimate {
     }
 }
 
-/// Formats a number of bytes in MiB or GiB.
+/// Formats a number of bytes in B, MiB or GiB.
 #[must_use]
 pub fn format_bytes(bytes: f64) -> String {
-    if bytes < 1024.0 * MIB { format!("{:.0} MiB", bytes / MIB) } else { format!("{:.1} GiB", bytes / 1024.0 / MIB) }
+    if bytes < MIB {
+        format!("{bytes:.0} B")
+    } else if bytes < 1024.0 * MIB {
+        format!("{:.0} MiB", bytes / MIB)
+    } else {
+        format!("{:.1} GiB", bytes / 1024.0 / MIB)
+    }
 }
 
 /// Returns the available memory in bytes: that of the machine, or the limit of the control group if it is smaller.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::shared::EngineArgs;
-use super::values::{integer, parse_pair};
+use super::values::{integer, parse_extent, parse_pair};
 use crate::memory::parse_size;
 use crate::task::TaskArgs;
 
@@ -112,6 +112,6 @@ pub(crate) struct SlideTile {
     #[arg(long, value_name = "X,Y", value_parser = parse_pair)]
     pub(crate) at: [u32; 2],
     /// Width and height, px
-    #[arg(long, value_name = "W,H", value_parser = parse_pair, default_value = "1024,1024")]
+    #[arg(long, value_name = "W,H", value_parser = parse_extent, default_value = "1024,1024")]
     pub(crate) size: [u32; 2],
 }

@@ -92,6 +92,14 @@ pub(super) fn parse_pair(text: &str) -> Result<[u32; 2], String> {
     Ok([number(first)?, number(second)?])
 }
 
+/// Parses a width and a height of at least 1 pixel.
+pub(super) fn parse_extent(text: &str) -> Result<[u32; 2], String> {
+    match parse_pair(text)? {
+        [0, _] | [_, 0] => Err("expected a width and a height of at least 1, for example 1024,768".to_owned()),
+        extent => Ok(extent),
+    }
+}
+
 /// Parses a pixel size, µm.
 #[cfg(any(feature = "calibrate", feature = "judge", feature = "learn", feature = "web"))]
 pub(super) fn parse_pixel(text: &str) -> Result<f64, String> {

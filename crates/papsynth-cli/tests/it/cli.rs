@@ -516,6 +516,22 @@ fn a_density_map_is_stored_and_part_of_the_recipe() {
 }
 
 #[test]
+fn sizes_and_names_of_outputs_that_cannot_be_are_explained() {
+    let bench = Bench::new("impossible");
+    for (words, expected) in [
+        ("slide tile --at 0,0 --size 0,0 --out tile.png", "a width and a height of at least 1"),
+        ("generate --out out --frames 1 --max-memory 1", "the limit is 1 B (--max-memory)"),
+        ("preview --out sub/", "sub/: is a folder; expected the name of a file"),
+        ("submit slurm --tasks 2 -- --bogus", "error: unexpected argument '--bogus'"),
+    ] {
+        let run = bench.run(words);
+        assert!(run.code == 2 && run.err.contains(expected), "{words}: {}", run.err);
+        assert!(!run.err.contains("error: error"), "{}", run.err);
+    }
+    assert!(bench.files(".").is_empty());
+}
+
+#[test]
 fn all_cells_can_be_set_at_once() {
     let bench = Bench::new("no-cells");
     bench.good(&format!("generate --out out --frames 1 {TINY} --set cells={{}} --set debris.speckles.count=3"));
