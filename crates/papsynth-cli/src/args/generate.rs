@@ -59,7 +59,8 @@ pub(crate) struct Generate {
     /// Print errors only
     #[arg(long, short, conflicts_with = "json")]
     pub(crate) quiet: bool,
-    /// Print progress, result and errors as JSON on standard output, one object per line
+    /// Print progress, result and errors as JSON on standard output, one object per line; errors of the command line
+    /// itself, such as an unknown option, stay text
     #[arg(long)]
     pub(crate) json: bool,
 }
