@@ -13,7 +13,10 @@ pub(crate) fn run(args: &Submit) -> Result<(), ExitError> {
     let generate = match args::parse(words.map(Into::into)) {
         Ok(Cli { verb: Verb::Generate(generate) }) => generate,
         Ok(_) => return Err(ExitError::input("after `--`: expected only arguments of `papsynth generate`")),
-        Err(error) => return Err(ExitError::input(error)),
+        Err(error) => {
+            let text = error.to_string();
+            return Err(ExitError::input(text.strip_prefix("error: ").unwrap_or(&text).trim_end()));
+        }
     };
     if generate.task.task.is_some() || generate.engine.threads.is_some() {
         return Err(ExitError::with_help(
