@@ -243,6 +243,9 @@ fn an_unfinished_data_set_is_completed_by_the_same_command() {
     assert!(run.code == 2 && run.err.contains("run the same `papsynth generate` command again"), "{}", run.err);
     assert!(run.err.contains("`papsynth clean out` removes temporary files"), "{}", run.err);
     assert!(!run.err.contains("--untracked"), "{}", run.err);
+    fs::rename(bench.path("out/model.json"), bench.path("model.json")).unwrap();
+    let run = bench.run("verify out");
+    assert!(run.out.contains("model.json: missing\n"), "{}", run.out);
     bench.good(&command);
     root(&bench, "out", 3);
 }

@@ -135,7 +135,7 @@ impl Manifest {
             file.sealed();
         match head_sha256 == expected {
             true => Ok(Self { writer, identity, layout, categories, frames, shards, files }),
-            false => Err(InputError::broken("JSON", "was changed: the SHA-256 of its head differs")),
+            false => Err(InputError::broken("JSON", "its head was changed: the SHA-256 differs")),
         }
     }
 }

@@ -101,7 +101,7 @@ impl ShardRecord {
         record.layout.check()?;
         record.check_frames()?;
         if record.sealed().sha256 != record.sha256 {
-            return Err(json("was changed: its SHA-256 differs".to_owned()));
+            return Err(json("its content was changed: the SHA-256 differs".to_owned()));
         }
         // The manifest lists the hash of the bytes.
         if record.to_json() != bytes {

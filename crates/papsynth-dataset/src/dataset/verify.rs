@@ -223,7 +223,11 @@ fn input_findings(dataset: &Dataset, merged: &[FileRecord]) -> Result<Vec<Findin
             false => record(name).is_some_and(|file| file.sha256 == *sha256),
         };
         if !is_it {
-            findings.push(Finding::damaged(name, "changed: the SHA-256 differs from the one in manifest.json"));
+            let message = match folder.has(name)? {
+                true => "changed: the SHA-256 differs from the one in manifest.json",
+                false => "missing",
+            };
+            findings.push(Finding::damaged(name, message));
         }
     }
     if !findings.is_empty() || merged.is_empty() || identity.stream_version != STREAM_VERSION {

@@ -196,7 +196,7 @@ impl SlideRecord {
             return invalid("lists a file outside the slide");
         }
         if record.clone().sealed().sha256 != record.sha256 {
-            return invalid("was changed: its SHA-256 differs");
+            return invalid("its content was changed: the SHA-256 differs");
         }
         if record.to_json() != bytes {
             return invalid("was reformatted: the content is equal, but not the bytes");
