@@ -89,10 +89,9 @@ pub(crate) fn run(args: &Generate) -> Result<(), ExitError> {
 /// Prints which splits by slide have no frames.
 fn note_empty_splits(empty: &[String]) {
     if !empty.is_empty() {
-        exit::note(format!(
-            "no slide is in the split {}; for splits by slide, generate more frames or set slide.fields_per_slide = 1",
-            empty.join(" and ")
-        ));
+        let names = empty.join(" and ");
+        let are = if empty.len() == 1 { format!("the split {names} is") } else { format!("the splits {names} are") };
+        exit::note(format!("{are} empty; for splits by slide, generate more frames or set slide.fields_per_slide = 1"));
     }
 }
 

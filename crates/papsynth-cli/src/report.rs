@@ -214,17 +214,18 @@ impl Bar {
 #[derive(Debug)]
 pub(crate) struct FrameCounter {
     bar: Bar,
+    what: &'static str,
     done: AtomicU64,
     total: u64,
 }
 
 impl FrameCounter {
-    pub(crate) fn start(quiet: bool, total: u64) -> Self {
-        Self { bar: Bar::start(quiet), done: AtomicU64::new(0), total }
+    pub(crate) fn start(quiet: bool, what: &'static str, total: u64) -> Self {
+        Self { bar: Bar::start(quiet), what, done: AtomicU64::new(0), total }
     }
 
     pub(crate) fn step(&self) {
-        self.bar.update(self.done.fetch_add(1, Ordering::Relaxed) + 1, self.total, "frames");
+        self.bar.update(self.done.fetch_add(1, Ordering::Relaxed) + 1, self.total, self.what);
     }
 
     pub(crate) fn clear(&self) {

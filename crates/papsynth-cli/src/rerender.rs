@@ -59,7 +59,7 @@ pub(crate) fn convert(args: &Convert) -> Result<(), ExitError> {
     let layout = args.files.layout(args.format.clone());
     let stop = exit::stop_flag()?;
     let total = Dataset::open(&args.dir)?.frame_locations()?.len() as u64;
-    let counter = FrameCounter::start(args.quiet, total);
+    let counter = FrameCounter::start(args.quiet, "converting frames", total);
     let outcome = papsynth_dataset::convert(&args.dir, &args.out, &layout, stop, &|_| counter.step());
     counter.clear();
     let outcome = outcome?;
@@ -110,7 +110,8 @@ pub(crate) fn render(
 ) -> Result<Outcome, ExitError> {
     let dataset = Dataset::create_or_resume(out, &setup.info(seed, layout))?;
     let mut sum = Outcome { present: 0, written: 0, stopped: false };
-    let counter = FrameCounter::start(quiet, frames.iter().map(|range| range.end - range.start).sum());
+    let count = frames.iter().map(|range| range.end - range.start).sum();
+    let counter = FrameCounter::start(quiet, "rendering frames", count);
     for frames in frames {
         let run = run_of(frames.clone(), setup.threads, stop);
         let outcome = dataset.generate(&setup.engine, &run, &|_| counter.step());

@@ -10,6 +10,7 @@ use papsynth_web::{Error, Server, serve_study};
 use crate::args::{Study, View, Workbench};
 use crate::exit::{self, ErrorReport, ExitError};
 use crate::setup::Setup;
+use crate::words::counted;
 use crate::{generate, memory, preview};
 
 /// Opens a page in the default browser.
@@ -124,8 +125,9 @@ fn announcement(session: &Session, server: &Server) -> String {
         answered => format!(", {answered} of them answered"),
     };
     let (State { training, trials, .. }, address) = (state, server.address());
+    let practice = counted(training as u64, "practice trial", "practice trials");
     format!(
-        "{training} practice trials and {trials} scored trials{done}; {real} real and {synthetic} synthetic fields\n\
+        "{practice} and {trials} scored trials{done}; {real} real and {synthetic} synthetic fields\n\
          Open {address} in a browser. Press Ctrl-C to quit; run the same command again to continue.\n"
     )
 }

@@ -31,7 +31,7 @@ pub(crate) struct RecipeArgs {
     /// training; 1.5 adds half of the spread between real slides
     #[arg(long, value_name = "FACTOR", value_parser = number(1.0, 5.0))]
     pub(crate) widen: Option<f64>,
-    /// Set one parameter of the recipe, under all of its conditions; repeatable, the last value counts
+    /// Set one parameter of the recipe, also where the recipe has [[conditions]]; repeatable, the last value counts
     #[arg(long, value_name = "KEY=VALUE", allow_hyphen_values = true)]
     pub(crate) set: Vec<String>,
 }
