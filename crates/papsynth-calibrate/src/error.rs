@@ -15,6 +15,17 @@ pub enum Error {
     /// The stack contains no nucleus.
     #[error("no nucleus found: expected a dark, compact object")]
     NoNucleus,
+    /// Too few planes show a measurable blur.
+    #[error(
+        "the blur of {blurred} of {planes} planes is at the limit of 16 px: the images are not planes of one focus \
+         stack, or the planes are too far apart"
+    )]
+    Blurred {
+        /// Number of distances from focus at the limit.
+        blurred: usize,
+        /// Number of distances from focus.
+        planes: usize,
+    },
     /// A nucleus cannot be measured.
     #[error("window {},{},{},{}: {source}", window.left, window.top, window.width, window.height)]
     Window {

@@ -20,6 +20,9 @@ const MAX_SIGMA_PX: f64 = 15.8;
 /// Number of common distances on both sides of focus from which only these are fitted.
 const MIN_COMMON: usize = 3;
 
+/// Smallest number of fitted distances on a side of focus that has as many.
+const MIN_FITTED: usize = 2;
+
 /// Smallest number of nuclei for a representative median.
 const MIN_NUCLEI: usize = 5;
 
@@ -120,7 +123,7 @@ impl Focus {
     ///
     /// # Errors
     /// If there are fewer than 3 planes, no nucleus is found, a given window or all detected ones cannot be measured,
-    /// or the aperture of the condenser cannot be estimated.
+    /// the blur of most planes is at the limit of the search, or the aperture of the condenser cannot be estimated.
     ///
     /// # Panics
     /// If planes differ in size or are not complete rows.
@@ -153,19 +156,19 @@ impl Focus {
         if measured.is_empty() {
             return Err(refused.unwrap_or(Error::NoNucleus));
         }
+        let focus = Self::fit(measured.iter().map(|(_, nucleus)| nucleus.clone()).collect(), *step_um)?;
         let condenser = match (*step_um, instrument) {
             (Some(step_um), Some(instrument)) => {
                 Some(Condenser::estimate(planes, width, &measured, step_um, instrument)?)
             }
             _ => None,
         };
-        let nuclei = measured.into_iter().map(|(_, nucleus)| nucleus).collect();
-        Ok(Self { condenser, ..Self::fit(nuclei, *step_um) })
+        Ok(Self { condenser, ..focus })
     }
 
     /// Fits lines through the medians of all nuclei.
-    fn fit(nuclei: Vec<Nucleus>, step_um: Option<f64>) -> Self {
-        let offsets = medians(&nuclei);
+    fn fit(nuclei: Vec<Nucleus>, step_um: Option<f64>) -> Result<Self, Error> {
+        let offsets = medians(&nuclei)?;
         let fitted = |planes: i64| offsets.iter().any(|o| o.planes == planes && o.fitted);
         let side = |sign: i64| {
             let points = offsets.iter().filter(|o| o.fitted && o.planes * sign > 0);
@@ -183,7 +186,7 @@ impl Focus {
                 .collect(),
         };
         let mean_slope = 0.5 * (before.slope_px + after.slope_px);
-        Self {
+        Ok(Self {
             step_um,
             nuclei,
             offsets,
@@ -193,12 +196,16 @@ impl Focus {
             proportional_error_px: standard_error(&of_each),
             asymmetry: if mean_slope > 0.0 { (before.slope_px - after.slope_px).abs() / mean_slope } else { 0.0 },
             condenser: None,
-        }
+        })
     }
 }
 
 /// Returns medians and quartiles of all nuclei by distance from focus, and selects those for the line fits.
-fn medians(nuclei: &[Nucleus]) -> Vec<Offset> {
+///
+/// # Errors
+/// If fewer than [`MIN_FITTED`] distances on one side of focus can be fitted, because the blur of the others is at the
+/// limit.
+fn medians(nuclei: &[Nucleus]) -> Result<Vec<Offset>, Error> {
     let mut by_offset: BTreeMap<i64, Vec<f64>> = BTreeMap::new();
     for (planes, sigma) in nuclei.iter().flat_map(Nucleus::points) {
         by_offset.entry(planes).or_default().push(sigma);
@@ -212,11 +219,45 @@ fn medians(nuclei: &[Nucleus]) -> Vec<Offset> {
             Offset { planes, nuclei: sigmas.len(), sigma_px, quartiles_px: [low, high], fitted }
         })
         .collect();
+    let seen = || offsets.iter().filter(|o| o.planes != 0 && o.nuclei >= enough);
+    for sign in [-1, 1] {
+        let side = || seen().filter(|o| o.planes * sign > 0);
+        if side().filter(|o| o.fitted).count() < MIN_FITTED.min(side().count()) {
+            let blurred = seen().filter(|o| !o.fitted).count();
+            return Err(Error::Blurred { blurred, planes: seen().count() });
+        }
+    }
     // Blur is not exactly linear: equal distances on both sides make the slopes comparable.
     let good: Vec<i64> = offsets.iter().filter(|o| o.fitted).map(|o| o.planes).collect();
     let common: Vec<i64> = good.iter().copied().filter(|n| good.contains(&-n)).collect();
     if common.len() >= 2 * MIN_COMMON {
         offsets.iter_mut().for_each(|o| o.fitted = common.contains(&o.planes));
     }
-    offsets
+    Ok(offsets)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns the nuclei of a stack with focus in its middle, with σ given by the distance from focus.
+    fn stack(planes: usize, sigma: impl Fn(usize) -> f64) -> Vec<Nucleus> {
+        let focused = planes / 2;
+        let sigma_px = (0..planes).map(|plane| sigma(plane.abs_diff(focused))).collect();
+        vec![Nucleus { window: [0, 0, 9, 9], focused, sigma_px }; 6]
+    }
+
+    #[test]
+    fn planes_at_the_limit_of_the_search_are_not_a_focus_stack() {
+        for planes in 3..12 {
+            let unrelated = Focus::fit(stack(planes, |n| if n == 0 { 0.0 } else { 16.0 }), None).unwrap_err();
+            let message = format!("the blur of {0} of {0} planes is at the limit of 16 px", planes - 1);
+            assert!(unrelated.to_string().starts_with(&message), "{unrelated}");
+            let focus = Focus::fit(stack(planes, |n| n as f64), None).unwrap();
+            assert!((focus.proportional_px - 1.0).abs() < 1e-9, "{planes}");
+        }
+        // One distance on each side is enough only if there are no others.
+        assert!(Focus::fit(stack(5, |n| if n < 2 { 1.0 } else { 16.0 }), None).is_err());
+        Focus::fit(stack(7, |n| if n < 3 { n as f64 } else { 16.0 }), None).unwrap();
+    }
 }
