@@ -107,7 +107,7 @@ fn frames_of(task: Task, frames: &Range<u64>, each: u64) -> u64 {
 /// The parallelism that fits into memory. `few` is the number of shards if it is below the number of threads.
 fn fit(args: &Generate, setup: &Setup, few: Option<usize>, layout: &Layout) -> Result<MemoryPlan, ExitError> {
     let recipe = &setup.recipe.recipe;
-    let need = MemoryEstimate::of(recipe, layout);
+    let need = MemoryEstimate::of(recipe, &setup.model, layout);
     let wanted = (few.map_or(setup.threads, |_| 1), few.is_some() && setup.threads > 1);
     memory::fit(&need, setup.threads, wanted, args.max_memory, |Budget { bytes, source }| {
         let help = "smaller fields, fewer cells, one plane, monochrome light and less oversampling need less memory; \

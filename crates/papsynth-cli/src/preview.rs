@@ -74,7 +74,7 @@ pub(crate) fn render(args: Render) -> Result<(), ExitError> {
 /// Checks that one frame fits into memory.
 pub(crate) fn check_memory(setup: &Setup) -> Result<(), ExitError> {
     let recipe = &setup.recipe.recipe;
-    let need = MemoryEstimate::of(recipe, &Layout::default());
+    let need = MemoryEstimate::of(recipe, &setup.model, &Layout::default());
     let fit = memory::fit(&need, setup.threads, (1, false), None, |Budget { bytes, source }| {
         let help = "smaller fields, fewer cells, one plane, monochrome light and less oversampling need less memory";
         ExitError::with_help(format!("{} ({source})", need.too_large(recipe, bytes)), help)

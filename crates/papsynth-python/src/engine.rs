@@ -80,7 +80,7 @@ impl Engine {
         }
         let (inputs, map) =
             read_inputs(&mut recipe, &folder, &Limits::default()).map_err(|error| error::dataset(&error))?;
-        let need = MemoryEstimate::of(&recipe, &Layout::default());
+        let need = MemoryEstimate::of(&recipe, &model, &Layout::default());
         if let Some(bytes) = available().filter(|bytes| need.of_one_frame() > *bytes as f64) {
             return Err(PyMemoryError::new_err(need.too_large(&recipe, bytes)));
         }

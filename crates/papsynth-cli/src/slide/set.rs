@@ -65,7 +65,7 @@ pub(super) fn make(mut args: SlideMake) -> Result<(), ExitError> {
 /// The number of threads that fits into memory, each with one frame.
 fn fitting(args: &SlideMake, setup: &Setup, shard_px: u32) -> Result<usize, ExitError> {
     let recipe = &setup.recipe.recipe;
-    let need = MemoryEstimate::of_slide(recipe, shard_px);
+    let need = MemoryEstimate::of_slide(recipe, &setup.model, shard_px);
     let fit = memory::fit(&need, setup.threads, (setup.threads, false), args.max_memory, |Budget { bytes, source }| {
         let (frame_px, needed, may) =
             (recipe.scan.frame_px, format_bytes(need.of_one_frame()), format_bytes(bytes as f64));

@@ -169,7 +169,7 @@ impl Matching {
         // The fields as real numbers, and their samples.
         let fields = images.iter().map(|(_, real)| 8 * real.image.levels.len() as u64).sum();
         let left = self.max_memory.map(|most| most.saturating_sub(fields));
-        let estimate = MemoryEstimate::of(&recipe, &Layout::default());
+        let estimate = MemoryEstimate::of(&recipe, &self.model, &Layout::default());
         let plan = estimate.plan(self.threads(), false, left);
         let too_large = || Reply::error(422, &estimate.too_large(&recipe, left.unwrap_or_default()));
         Ok(Task { matching, images, workers: plan.ok_or_else(too_large)?.workers })

@@ -217,7 +217,7 @@ impl Renderer {
     /// Returns a message if the image of a recipe needs too much memory.
     fn too_large(&self, recipe: &Recipe) -> Option<String> {
         let max_memory = self.max_memory?;
-        let estimate = MemoryEstimate::of(recipe, &Layout::default());
+        let estimate = MemoryEstimate::of(recipe, &self.model, &Layout::default());
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a fraction of a size")]
         let budget = (max_memory as f64 * FRAME_MEMORY) as u64;
         (estimate.of_one_frame() > budget as f64).then(|| estimate.too_large(recipe, budget))

@@ -12,6 +12,7 @@ use fsd_shape::ShapeStatistics;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, ErrorKind, within};
+use crate::recipe::CellMix;
 
 /// Version of the model format that this crate reads and writes.
 pub const MODEL_VERSION: u32 = 1;
@@ -115,7 +116,8 @@ pub struct CellClass {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CytoplasmStatistics {
-    /// Radius of the circle of the first Fourier descriptor, |u₁|, µm.
+    /// Radius of the circle of the first Fourier descriptor, |u₁|, µm: a median of 0.5 to 100 µm, and a standard
+    /// deviation of the logarithm of 0 to 1. Drawn radii are at most 300 µm.
     pub radius_um: LogNormal,
     /// Median absorbance of a cell.
     pub absorbance: LogNormal,
@@ -206,7 +208,8 @@ fn is_one(value: &f64) -> bool {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NucleusStatistics {
-    /// Radius of the circle of the first Fourier descriptor, |u₁|, µm.
+    /// Radius of the circle of the first Fourier descriptor, |u₁|, µm: a median of 0.2 to 50 µm, and a standard
+    /// deviation of the logarithm of 0 to 1.
     pub radius_um: LogNormal,
     /// Correlation of the log radii of nucleus and cell, −1 to 1.
     pub size_correlation: f64,
@@ -360,11 +363,28 @@ impl CytoplasmTexture {
     }
 }
 
+/// Largest radius of a drawn cell, µm. It limits time and memory; cells of smears have up to about 60 µm.
+pub(crate) const MAX_RADIUS_UM: f64 = 300.0;
+
 impl CellClass {
+    /// Returns the size of cells of a mix relative to those of the built-in classes, for estimates of memory.
+    #[must_use]
+    pub fn relative_size(&self, mix: &CellMix) -> f64 {
+        /// Upper bounds for the built-in classes: of the median, and of 2 standard deviations above it, µm.
+        const MEDIAN_UM: f64 = 32.0;
+        const LARGE_UM: f64 = 45.0;
+        /// Radius of intermediate cells, µm.
+        const USUAL_UM: f64 = 26.0;
+        let [size, variation] = [&mix.size, &mix.size_variation].map(|number| number.bounds()[1]);
+        let LogNormal { median, log_sd } = self.cytoplasm.radius_um;
+        let large = median * libm::exp(2.0 * variation * log_sd);
+        (size * (median / MEDIAN_UM).max(large / LARGE_UM).max(1.0)).min(MAX_RADIUS_UM / USUAL_UM)
+    }
+
     fn check(&self, path: &str) -> Result<(), ErrorKind> {
         let at = |field: &str| format!("{path}.{field}");
         let (cytoplasm, nucleus) = (&self.cytoplasm, &self.nucleus);
-        cytoplasm.radius_um.check(&at("cytoplasm.radius_um"), 0.5, 500.0)?;
+        cytoplasm.radius_um.check_radius(&at("cytoplasm.radius_um"), 0.5, 100.0)?;
         cytoplasm.absorbance.check(&at("cytoplasm.absorbance"), 1e-4, 4.0)?;
         profile(&at("cytoplasm.rim_to_centre"), &cytoplasm.rim_to_centre)?;
         cytoplasm.form.check(&at("cytoplasm.form"))?;
@@ -378,7 +398,7 @@ impl CellClass {
             halo.rim.check(&at("cytoplasm.halo.rim"), 0.0, 4.0)?;
         }
         cytoplasm.shapes.check(&at("cytoplasm.shapes"))?;
-        nucleus.radius_um.check(&at("nucleus.radius_um"), 0.2, 200.0)?;
+        nucleus.radius_um.check_radius(&at("nucleus.radius_um"), 0.2, 50.0)?;
         within(&at("nucleus.size_correlation"), nucleus.size_correlation, [-1.0, 1.0])?;
         nucleus.off_centre.check(&at("nucleus.off_centre"), 0.0, 1.0)?;
         within(&at("nucleus.polarity"), nucleus.polarity, [0.0, 1.0])?;
@@ -427,6 +447,12 @@ impl LogNormal {
     fn check(&self, path: &str, low: f64, high: f64) -> Result<(), ErrorKind> {
         within(&format!("{path}.median"), self.median, [low, high])?;
         within(&format!("{path}.log_sd"), self.log_sd, [0.0, 3.0])
+    }
+
+    /// Checks a radius, µm. The time and memory of a cell increase with its area.
+    fn check_radius(&self, path: &str, low: f64, high: f64) -> Result<(), ErrorKind> {
+        self.check(path, low, high)?;
+        within(&format!("{path}.log_sd"), self.log_sd, [0.0, 1.0])
     }
 }
 

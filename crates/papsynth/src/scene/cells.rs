@@ -6,7 +6,7 @@ use rand_core::Rng;
 
 use crate::error::ErrorKind;
 use crate::key::{Key, Stream};
-use crate::model::{CellClass, CytoplasmTexture, HaloStatistics, Model, TextureKind};
+use crate::model::{CellClass, CytoplasmTexture, HaloStatistics, MAX_RADIUS_UM, Model, TextureKind};
 use crate::random;
 use crate::recipe::section::named;
 use crate::recipe::{CellMix, GroupForm, Number, Recipe};
@@ -200,6 +200,7 @@ fn draw_body(
     let size_variation = mix.size_variation.draw(&mut own("size.variation"));
     let partner = correlation * first + (1.0 - correlation * correlation).max(0.0).sqrt() * second;
     let radius_um = size * cytoplasm.radius_um.median * libm::exp(size_variation * cytoplasm.radius_um.log_sd * first);
+    let radius_um = radius_um.min(MAX_RADIUS_UM);
     let nucleus_log_sd = size_variation * nucleus.radius_um.log_sd;
     let mut nucleus_um = size
         * mix.nucleus_size.draw(&mut own("nucleus.size"))
@@ -378,4 +379,21 @@ fn draw_fold(recipe: &Recipe, pliability: f64, rng: &mut Stream) -> Option<Fold>
         FoldForm::FoldedOver => FOLDED_OVER,
     };
     Some(Fold { form, direction_deg, depth, curvature, radius_um })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_setting_draws_a_cell_larger_than_the_limit() {
+        let mix = CellMix { count: 20.into(), size: 10.into(), size_variation: 5.into(), ..CellMix::default() };
+        let recipe = Recipe { cells: [("superficial".to_owned(), mix)].into(), ..Recipe::default() };
+        let scene = crate::scene::draw(&recipe, &Model::builtin(), None, Key { seed: 1, index: 0 }).unwrap();
+        let radii = scene.objects.iter().filter_map(|object| match &object.body {
+            Body::Cell(cell) => Some(cell.radius_um),
+            _ => None,
+        });
+        assert_eq!(radii.fold(0.0, f64::max), MAX_RADIUS_UM);
+    }
 }
