@@ -159,6 +159,10 @@ impl<'de> Visitor<'de> for AbundanceVisitor {
         Ok(Number::Fixed(value as f64).into())
     }
 
+    fn visit_i128<E: de::Error>(self, value: i128) -> Result<Abundance, E> {
+        Ok(Number::Fixed(value as f64).into())
+    }
+
     fn visit_u64<E: de::Error>(self, value: u64) -> Result<Abundance, E> {
         Ok(Number::Fixed(value as f64).into())
     }

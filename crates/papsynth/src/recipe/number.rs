@@ -403,6 +403,10 @@ impl<'de> Visitor<'de> for NumberVisitor {
 /// The entries of a table that describes a distribution.
 #[derive(Default)]
 pub(crate) struct Entries {
+    fn visit_i128<E: de::Error>(self, value: i128) -> Result<Number, E> {
+        Ok(Number::Fixed(value as f64))
+    }
+
     distribution: Option<Distribution>,
     min: Option<f64>,
     max: Option<f64>,
@@ -419,7 +423,12 @@ impl Entries {
             "min" => self.min = Some(map.next_value()?),
             "max" => self.max = Some(map.next_value()?),
             "uniform" | "normal" | "log_normal" if self.distribution.is_none() => {
-                let [a, b]: [f64; 2] = map.next_value()?;
+                // The TOML reader ignores the rest of an array that is longer than the type.
+                let values: Vec<f64> = map.next_value()?;
+                let [a, b] = values[..] else {
+                    let message = format!("expected 2 numbers in `{name}`, found {}", values.len());
+                    return Err(de::Error::custom(message));
+                };
                 self.distribution = Some(match name {
                     "uniform" => Distribution::Uniform(a, b),
                     "normal" => Distribution::Normal(a, b),
@@ -541,6 +550,17 @@ mod tests {
         assert!(parse("{ normal = [1, -1] }").unwrap().problem(0.0, 9.0).is_some());
         assert!(parse("{ normal = [1, 1] }").unwrap().problem(0.0, 9.0).unwrap().contains("(from -3 to 5)"));
         assert!(parse("{ choice = [] }").unwrap().problem(0.0, 9.0).is_some());
+    #[test]
+    fn a_pair_has_exactly_two_numbers() {
+        for name in ["uniform", "normal", "log_normal"] {
+            for count in [0, 1, 3, 4, 9] {
+                let error = parse(&format!("{{ {name} = {:?} }}", vec![1; count])).unwrap_err();
+                assert!(error.contains(&format!("expected 2 numbers in `{name}`, found {count}")), "{error}");
+            }
+            parse(&format!("{{ {name} = [1, 1] }}")).unwrap();
+        }
+    }
+
         assert!(parse("{ normal = [1, 1], min = 8 }").unwrap().problem(0.0, 9.0).unwrap().contains("no value between"));
         assert!(parse("-1").unwrap().problem(0.0, 9.0).unwrap().contains("out of range: expected 0 to 9"));
     }
