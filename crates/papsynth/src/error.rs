@@ -1,5 +1,7 @@
 //! The errors of the engine.
 
+use crate::recipe::number::shown;
+
 /// An error of the engine.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -41,7 +43,7 @@ pub enum Error {
 #[non_exhaustive]
 pub enum ErrorKind {
     /// A number is out of range.
-    #[error("{field}: {value} is out of range: expected {low} to {high}")]
+    #[error("{field}: {} is out of range: expected {} to {}", shown(*value), shown(*low), shown(*high))]
     OutOfRange {
         /// Path of the field.
         field: String,

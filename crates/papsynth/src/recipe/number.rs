@@ -193,7 +193,7 @@ impl Number {
             Self::Drawn { .. } => &[],
         };
         let value = written.iter().find(|value| value.is_finite() && value.floor() != **value)?;
-        Some(format!("{value} is not an integer"))
+        Some(format!("{} is not an integer", shown(*value)))
     }
 
     /// Returns a message if the number is invalid or not within `low..=high`.
@@ -214,7 +214,8 @@ impl Number {
             return Some(format!("{self} has no value between `min` and `max`"));
         }
         if least < low || most > high {
-            let reach = if least < most { format!(" (from {least} to {most})") } else { String::new() };
+            let reach =
+                if least < most { format!(" (from {} to {})", shown(least), shown(most)) } else { String::new() };
             return Some(format!("{self}{reach} is out of range: expected {}", range(low, high)));
         }
         None
@@ -222,7 +223,13 @@ impl Number {
 }
 
 fn range(low: f64, high: f64) -> String {
-    format!("{low} to {high}")
+    format!("{} to {}", shown(low), shown(high))
+}
+
+/// Returns a number for a message: very large and very small ones in scientific notation.
+pub(crate) fn shown(value: f64) -> String {
+    let is_usual = value == 0.0 || !value.is_finite() || (1e-4..1e10).contains(&value.abs());
+    if is_usual { value.to_string() } else { format!("{value:e}") }
 }
 
 impl Distribution {
@@ -277,14 +284,19 @@ impl Distribution {
                 Some("expected two finite numbers in `uniform`".to_owned())
             }
             Self::Uniform(low, high) if low > high => {
+                let [low, high] = [low, high].map(|value| shown(*value));
                 Some(format!("`uniform = [{low}, {high}]` has its bounds swapped: expected [{high}, {low}]"))
             }
             Self::Normal(mean, sd) if !number(mean) || !number(sd) || *sd < 0.0 => Some(format!(
-                "`normal = [{mean}, {sd}]`: expected a finite mean and a standard deviation of at least 0"
+                "`normal = [{}, {}]`: expected a finite mean and a standard deviation of at least 0",
+                shown(*mean),
+                shown(*sd)
             )),
             Self::LogNormal(median, sd) if !number(median) || *median <= 0.0 || !number(sd) || *sd < 0.0 => {
                 Some(format!(
-                    "`log_normal = [{median}, {sd}]`: expected a median above 0 and a standard deviation of at least 0"
+                    "`log_normal = [{}, {}]`: expected a median above 0 and a standard deviation of at least 0",
+                    shown(*median),
+                    shown(*sd)
                 ))
             }
             Self::Choice(values) if values.is_empty() || values.iter().any(|v| !v.is_finite()) => {
@@ -314,14 +326,14 @@ impl Distribution {
 impl fmt::Display for Number {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Fixed(value) => write!(f, "{value}"),
+            Self::Fixed(value) => f.write_str(&shown(*value)),
             Self::Drawn { distribution, min, max } => {
                 write!(f, "{{ {} = {:?}", distribution.name(), distribution.values())?;
                 if min.is_finite() {
-                    write!(f, ", min = {min}")?;
+                    write!(f, ", min = {}", shown(*min))?;
                 }
                 if max.is_finite() {
-                    write!(f, ", max = {max}")?;
+                    write!(f, ", max = {}", shown(*max))?;
                 }
                 write!(f, " }}")
             }
@@ -391,6 +403,10 @@ impl<'de> Visitor<'de> for NumberVisitor {
         Ok(Number::Fixed(value as f64))
     }
 
+    fn visit_i128<E: de::Error>(self, value: i128) -> Result<Number, E> {
+        Ok(Number::Fixed(value as f64))
+    }
+
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Number, A::Error> {
         let mut entries = Entries::default();
         while let Some(name) = map.next_key::<String>()? {
@@ -403,10 +419,6 @@ impl<'de> Visitor<'de> for NumberVisitor {
 /// The entries of a table that describes a distribution.
 #[derive(Default)]
 pub(crate) struct Entries {
-    fn visit_i128<E: de::Error>(self, value: i128) -> Result<Number, E> {
-        Ok(Number::Fixed(value as f64))
-    }
-
     distribution: Option<Distribution>,
     min: Option<f64>,
     max: Option<f64>,
@@ -539,17 +551,21 @@ mod tests {
     }
 
     #[test]
-    fn invalid_numbers_have_a_message() {
-        assert!(parse("{ unifrom = [1, 2] }").unwrap_err().contains("unknown field `unifrom`"));
-        assert!(parse("{ min = 2 }").unwrap_err().contains("expected one of `uniform`"));
-        assert!(parse("{ uniform = [1, 2], choice = [1] }").unwrap_err().contains("found two"));
-        assert!(parse("\"many\"").is_err());
-        assert!(parse("{ uniform = [2, 1] }").unwrap().problem(0.0, 9.0).unwrap().contains("swapped"));
-        assert!(parse("nan").unwrap().problem(0.0, 9.0).unwrap().contains("finite"));
-        assert!(parse("inf").unwrap().problem(0.0, 9.0).is_some());
-        assert!(parse("{ normal = [1, -1] }").unwrap().problem(0.0, 9.0).is_some());
-        assert!(parse("{ normal = [1, 1] }").unwrap().problem(0.0, 9.0).unwrap().contains("(from -3 to 5)"));
-        assert!(parse("{ choice = [] }").unwrap().problem(0.0, 9.0).is_some());
+    fn messages_about_any_number_are_short_and_exact() {
+        for exponent in -300..300 {
+            for digits in ["1", "-2.5", "1.2345678901234567"] {
+                let value: f64 = format!("{digits}e{exponent}").parse().unwrap();
+                let text = shown(value);
+                assert!(text.len() <= 24, "{text}");
+                assert_eq!(text.parse(), Ok(value));
+                assert_eq!(parse(&Number::Fixed(value).to_string()).unwrap(), Number::Fixed(value));
+            }
+        }
+        assert_eq!([0.0, 0.001, 250.0, 1e6, 1e83].map(shown), ["0", "0.001", "250", "1000000", "1e83"]);
+        let problem = Number::log_normal(0.25, 50.0).problem(0.0, 20.0).unwrap();
+        assert!(problem.len() < 140 && problem.contains("e86)"), "{problem}");
+    }
+
     #[test]
     fn a_pair_has_exactly_two_numbers() {
         for name in ["uniform", "normal", "log_normal"] {
@@ -561,6 +577,18 @@ mod tests {
         }
     }
 
+    #[test]
+    fn invalid_numbers_have_a_message() {
+        assert!(parse("{ unifrom = [1, 2] }").unwrap_err().contains("unknown field `unifrom`"));
+        assert!(parse("{ min = 2 }").unwrap_err().contains("expected one of `uniform`"));
+        assert!(parse("{ uniform = [1, 2], choice = [1] }").unwrap_err().contains("found two"));
+        assert!(parse("\"many\"").is_err());
+        assert!(parse("{ uniform = [2, 1] }").unwrap().problem(0.0, 9.0).unwrap().contains("swapped"));
+        assert!(parse("nan").unwrap().problem(0.0, 9.0).unwrap().contains("finite"));
+        assert!(parse("inf").unwrap().problem(0.0, 9.0).is_some());
+        assert!(parse("{ normal = [1, -1] }").unwrap().problem(0.0, 9.0).is_some());
+        assert!(parse("{ normal = [1, 1] }").unwrap().problem(0.0, 9.0).unwrap().contains("(from -3 to 5)"));
+        assert!(parse("{ choice = [] }").unwrap().problem(0.0, 9.0).is_some());
         assert!(parse("{ normal = [1, 1], min = 8 }").unwrap().problem(0.0, 9.0).unwrap().contains("no value between"));
         assert!(parse("-1").unwrap().problem(0.0, 9.0).unwrap().contains("out of range: expected 0 to 9"));
     }
