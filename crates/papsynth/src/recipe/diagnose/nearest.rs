@@ -1,17 +1,20 @@
 //! Suggestions for misspelt words.
 
-/// Returns the candidate most similar to a misspelt word, if one is similar enough.
+/// Returns the candidate most similar to a misspelt word, if one is similar enough, or one that begins with the word.
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     /// A candidate is similar enough if at most one letter in so many changes.
     const LETTERS_PER_CHANGE: usize = 3;
     let plain = fold(word);
     let reach = (plain.len() / LETTERS_PER_CHANGE).max(1);
+    let candidates: Vec<&str> = candidates.into_iter().collect();
+    let begins = |candidate: &str| plain.len() >= LETTERS_PER_CHANGE && fold(candidate).starts_with(&plain);
     candidates
-        .into_iter()
-        .map(|candidate| (distance(&plain, &fold(candidate)), candidate))
+        .iter()
+        .map(|candidate| (distance(&plain, &fold(candidate)), *candidate))
         .filter(|(changes, _)| *changes <= reach)
         .min_by_key(|(changes, _)| *changes)
         .map(|(_, candidate)| candidate)
+        .or_else(|| candidates.iter().copied().find(|candidate| begins(candidate)))
 }
 
 /// Ignores case and the difference between dash and underscore.
@@ -63,6 +66,10 @@ mod tests {
         assert_eq!(nearest("widht_px", keys), Some("width_px"));
         assert_eq!(nearest("Width-px", keys), Some("width_px"));
         assert_eq!(nearest("colour", keys), None);
+        assert_eq!(
+            [nearest("width", keys), nearest("pix", keys), nearest("p", keys)],
+            [Some("width_px"), Some("pixel_um"), None]
+        );
         assert_eq!(nearest(&"x".repeat(100_000), keys), None);
     }
 }
