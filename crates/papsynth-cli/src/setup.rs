@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use papsynth::model::Model;
 use papsynth::profile::Profile;
+use papsynth::recipe::diagnose;
 use papsynth::{Engine, Threads};
 use papsynth_dataset::read::{InputFile, Limits, read_inputs};
 use papsynth_dataset::{Check, DatasetInfo, Layout, Run, Task};
@@ -95,7 +96,9 @@ pub(crate) fn read_model(path: Option<&Path>) -> Result<Model, ExitError> {
         && let Err(error) = toml::from_str::<toml::Table>(&text)
     {
         let span = error.span().unwrap_or_default();
-        return Err(ErrorReport::new(error.message()).at(&name, &std::sync::Arc::new(text), span).into());
+        return Err(ErrorReport::new(diagnose::plain(error.message()))
+            .at(&name, &std::sync::Arc::new(text), span)
+            .into());
     }
     Model::builtin().with(&text).map_err(|error| ExitError::input(format!("{name}: {error}")))
 }

@@ -1,5 +1,6 @@
 //! The errors of the engine.
 
+use crate::recipe::diagnose::plain;
 use crate::recipe::number::shown;
 
 /// An error of the engine.
@@ -89,7 +90,7 @@ pub enum ErrorKind {
     #[error("nucleus.donors: {0}")]
     Donor(#[source] quilt_texture::Error),
     /// A text is not a model in JSON.
-    #[error("not a model of papsynth: {0}")]
+    #[error("not a model of papsynth: {}", plain(&.0.to_string()))]
     NotAModel(#[source] serde_json::Error),
     /// A text is not a class file in TOML.
     #[error("not a class file of papsynth: {0}")]
@@ -101,10 +102,29 @@ pub enum ErrorKind {
     #[error("version is {0}; expected {1}")]
     ModelVersion(String, u32),
     /// A field of a model or of a scene has a wrong type, is missing, or is unknown.
-    #[error(transparent)]
+    #[error("{}", plain(&.0.to_string()))]
     Json(#[from] serde_json::Error),
+    /// A value of a class file has a wrong type.
+    #[error("{at}expected {expected}, found {found}")]
+    WrongType {
+        /// Path of the field with a colon, or nothing.
+        at: String,
+        /// What is accepted.
+        expected: &'static str,
+        /// The value.
+        found: String,
+    },
+    /// A number of a class file is infinite or not a number.
+    #[error("{0}: expected a finite number, found NaN or infinity")]
+    NotFinite(String),
+    /// A class of a class file has an unknown key; second, its keys.
+    #[error("unknown key `{0}`: expected one of `{1}`")]
+    UnknownClassField(String, String),
+    /// A class without a base class misses a key.
+    #[error("add `like`, or the missing key `{0}`: a class without `like` needs all values")]
+    IncompleteClass(&'static str),
     /// The provenance of a class file is invalid.
-    #[error("provenance: {0}")]
+    #[error("provenance: {}", plain(&.0.to_string()))]
     Provenance(#[source] serde_json::Error),
     /// The classes of a class file are not a table.
     #[error("classes: expected a table of classes by name")]

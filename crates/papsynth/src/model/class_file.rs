@@ -6,6 +6,7 @@ use serde_json::{Map, Value};
 
 use super::{CellClass, CytoplasmTexture, MODEL_VERSION, Model, Provenance};
 use crate::error::{Error, ErrorKind};
+use crate::recipe::section::within;
 
 /// Class files of the built-in model.
 const BUILTIN_CLASSES: [&str; 2] = [include_str!("../../model/cervix.toml"), include_str!("../../model/oral.toml")];
@@ -80,7 +81,12 @@ fn merged(base: &Model, text: &str) -> Result<Model, ErrorKind> {
     let value: Value = if text.trim_start().starts_with('{') {
         serde_json::from_str(text).map_err(ErrorKind::NotAModel)?
     } else {
-        toml::from_str(text).map_err(ErrorKind::NotAClassFile)?
+        let value = toml::from_str(text).map_err(ErrorKind::NotAClassFile)?;
+        // JSON has no NaN and no infinity, and TOML no null.
+        if let Some(path) = path_of_null(&value) {
+            return Err(ErrorKind::NotFinite(path));
+        }
+        value
     };
     let Value::Object(mut file) = value else { return Err(ErrorKind::NotATable) };
     let version = file.remove("version");
@@ -131,28 +137,74 @@ fn like(class: &Value) -> Option<&str> {
     class.get("like").and_then(Value::as_str)
 }
 
+/// Keys of a class in a class file.
+const KEYS: [&str; 4] = ["like", "bethesda", "cytoplasm", "nucleus"];
+
 fn resolved(model: &Model, mut class: Value) -> Result<CellClass, ErrorKind> {
-    let complete = match like(&class).map(str::to_owned) {
-        None => class,
-        Some(of) => {
+    let Some(fields) = class.as_object_mut() else { return Err(wrong_type("", "a table", &class)) };
+    if let Some(unknown) = fields.keys().find(|key| !KEYS.contains(&key.as_str())) {
+        return Err(ErrorKind::UnknownClassField(unknown.clone(), KEYS.join("`, `")));
+    }
+    let complete = match fields.remove("like") {
+        None => match KEYS[1..].iter().find(|key| !fields.contains_key(**key)) {
+            Some(missing) => return Err(ErrorKind::IncompleteClass(missing)),
+            None => class,
+        },
+        Some(Value::String(of)) => {
             let mut base = serde_json::to_value(model.class(&of)?)?;
-            class.as_object_mut().map(|fields| fields.remove("like"));
-            merge(&mut base, class);
+            merge(&mut base, class, "")?;
             base
         }
+        Some(other) => return Err(wrong_type("like", "the name of a class", &other)),
     };
     Ok(serde_json::from_value(complete)?)
 }
 
-/// Replaces values of one object by those of another, recursively.
-fn merge(base: &mut Value, changes: Value) {
+/// Replaces values of one object at `path` by those of another, recursively. Values keep their types.
+fn merge(base: &mut Value, changes: Value, path: &str) -> Result<(), ErrorKind> {
+    let expected = match (&*base, &changes) {
+        (Value::Object(_), Value::Object(_)) | (Value::Null, _) | (_, Value::Null) => None,
+        (Value::Object(_), _) => Some("a table"),
+        (Value::Number(_), other) => (!other.is_number()).then_some("a number"),
+        (Value::Array(_), other) => (!other.is_array()).then_some("a list"),
+        (Value::String(_), other) => (!other.is_string()).then_some("a string"),
+        (Value::Bool(_), other) => (!other.is_boolean()).then_some("true or false"),
+    };
+    if let Some(expected) = expected {
+        return Err(wrong_type(path, expected, &changes));
+    }
     match (base, changes) {
-        (Value::Object(base), Value::Object(changes)) => {
-            for (key, value) in changes {
-                merge(base.entry(key).or_insert(Value::Null), value);
-            }
+        (Value::Object(base), Value::Object(changes)) => changes.into_iter().try_for_each(|(key, value)| {
+            let path = within(path, &key);
+            merge(base.entry(key).or_insert(Value::Null), value, &path)
+        }),
+        (base, changes) => {
+            *base = changes;
+            Ok(())
         }
-        (base, changes) => *base = changes,
+    }
+}
+
+fn wrong_type(path: &str, expected: &'static str, found: &Value) -> ErrorKind {
+    let found = match found {
+        Value::Object(_) => "a table".to_owned(),
+        Value::Array(_) => "a list".to_owned(),
+        other => other.to_string(),
+    };
+    let at = if path.is_empty() { String::new() } else { format!("{path}: ") };
+    ErrorKind::WrongType { at, expected, found }
+}
+
+/// Returns the path of the first null in a value.
+fn path_of_null(value: &Value) -> Option<String> {
+    let inside = |(name, value): (String, &Value)| {
+        path_of_null(value).map(|path| if path.is_empty() { name.clone() } else { within(&name, &path) })
+    };
+    match value {
+        Value::Null => Some(String::new()),
+        Value::Object(fields) => fields.iter().map(|(name, value)| (name.clone(), value)).find_map(inside),
+        Value::Array(items) => items.iter().enumerate().map(|(index, item)| (index.to_string(), item)).find_map(inside),
+        _ => None,
     }
 }
 
@@ -195,7 +247,35 @@ mod tests {
             ("version = 1\n[classes.\"\"]\nlike = \"intermediate\"", "invalid name ``"),
             ("version = 1\n[classes.a]\nlike = \"intermediate\"\ncytoplasm.form.taper = 4", "cytoplasm.form.taper: 4"),
             ("version = 1\n[classes.a]\nlike = \"intermediate\"\nnucleus.size = 4", "unknown field `size`"),
-            ("version = 1\n[classes.a]\nbethesda = \"NILM\"", "missing field"),
+            ("version = 1\n[classes.a]\nbethesda = \"NILM\"", "add `like`, or the missing key `cytoplasm`"),
+            ("version = 1\n[classes.a]", "add `like`, or the missing key `bethesda`"),
+            ("version = 1\nclasses.a = 3", "classes.a: expected a table, found 3"),
+            ("version = 1\n[classes.a]\nlike = 3", "like: expected the name of a class, found 3"),
+            (
+                "version = 1\n[classes.a]\nlikes = \"superficial\"",
+                "unknown key `likes`: expected one of `like`, `bethesda`",
+            ),
+            ("version = 1\n[classes.a]\nlike = \"intermediate\"\nnucleus = 3", "nucleus: expected a table, found 3"),
+            (
+                "version = 1\n[classes.a]\nlike = \"intermediate\"\nnucleus.radius_um.log_sd = nan",
+                "classes.a.nucleus.radius_um.log_sd: expected a finite number",
+            ),
+            (
+                "version = 1\n[classes.a]\nlike = \"intermediate\"\nnucleus.radius_um = [3, 0.2]",
+                "nucleus.radius_um: expected a table, found a list",
+            ),
+            (
+                "version = 1\n[classes.a]\nlike = \"intermediate\"\nnucleus.radius_um.log_sd = \"wide\"",
+                "nucleus.radius_um.log_sd: expected a number, found \"wide\"",
+            ),
+            (
+                "version = 1\n[classes.a]\nlike = \"intermediate\"\ncytoplasm.radius_um.median = 500",
+                "cytoplasm.radius_um.median: 500 is out of range: expected 0.5 to 100",
+            ),
+            (
+                "version = 1\n[classes.a]\nlike = \"intermediate\"\nnucleus.radius_um.log_sd = 3",
+                "nucleus.radius_um.log_sd: 3 is out of range: expected 0 to 1",
+            ),
             ("{", "papsynth"),
         ] {
             let message = with(text).unwrap_err();

@@ -220,9 +220,9 @@ mod tests {
             (at("body/radius_um"), Value::from(-1.0), "body.radius_um: -1 is out of range"),
             (at("body/radius_um"), Value::from(4e3), "the radius of the object is"),
             (at("body/radius_um"), "wide".into(), "body.radius_um: expected a number, found \"wide\""),
-            (at("body/tint"), "green".into(), "unknown variant `green`"),
-            (at("body/kind"), "dragon".into(), "unknown variant `dragon`"),
-            (at("body/dyes"), Value::from(vec![1.0]), "invalid length 1"),
+            (at("body/tint"), "green".into(), "unknown value `green`"),
+            (at("body/kind"), "dragon".into(), "unknown value `dragon`"),
+            (at("body/dyes"), Value::from(vec![1.0]), "expected a list of 5, found a list of 1"),
             (
                 at("body/detail/notches"),
                 1e9.into(),

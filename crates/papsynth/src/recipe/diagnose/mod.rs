@@ -10,9 +10,11 @@
 //! The fields are those of the JSON schema of [`Recipe`](super::Recipe): a new field needs no change here.
 
 mod nearest;
+mod plain;
 mod read;
 mod schema;
 
 pub use nearest::nearest;
+pub use plain::plain;
 pub use read::{FieldError, find, middle_left_out, read, unknown_classes};
 pub use schema::{Schema, Section, quoted};

@@ -6,6 +6,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::nearest::nearest;
+use super::plain::plain;
 use super::schema::{Schema, Section, quoted};
 use crate::model::Model;
 use crate::recipe::abundance::{Abundance, PER_MM2};
@@ -34,7 +35,7 @@ type Node<'t> = Spanned<DeValue<'t>>;
 /// All errors of the text, in its order: at least one.
 pub fn read(text: &str) -> Result<Recipe, Vec<FieldError>> {
     let whole = |span, message| vec![FieldError { path: Vec::new(), span, message, help: None }];
-    let table = DeTable::parse(text).map_err(|error| whole(error.span(), one_line(error.message())))?;
+    let table = DeTable::parse(text).map_err(|error| whole(error.span(), one_line(&plain(error.message()))))?;
     if table.get_ref().is_empty() {
         let message = "the recipe is empty; `papsynth init` prints one to start from";
         return Err(whole(Some(0..0), message.to_owned()));
@@ -238,7 +239,7 @@ impl Check<'_> {
             let start = node.span().start;
             start + span.start - BEFORE.len()..start + span.end - BEFORE.len()
         });
-        self.add(path, inner, &one_line(error.message()), Some(help_for(section)));
+        self.add(path, inner, &one_line(&plain(error.message())), Some(help_for(section)));
     }
 
     fn unknown_help(&self, name: &str, keys: Vec<&str>) -> String {
@@ -276,7 +277,7 @@ fn type_fault(error: &toml::de::Error, table: &DeTable<'_>, schema: &Schema) -> 
     if let Some(span) = &span {
         path_to(table, span, &mut path);
     }
-    let message = one_line(error.message());
+    let message = one_line(&plain(error.message()));
     let message = if path.is_empty() { message } else { format!("{}: {message}", path.join(".")) };
     let help = schema.at(&path).filter(|_| !path.is_empty()).map(help_for);
     FieldError { path, span, message, help }

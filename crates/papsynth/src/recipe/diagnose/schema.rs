@@ -188,6 +188,7 @@ impl<'s> Section<'s> {
             match self.types().first().copied() {
                 Some("integer") => "an integer".to_owned(),
                 Some("string") => "a string".to_owned(),
+                Some("array") => "an array".to_owned(),
                 Some("object") if self.keys(None).is_empty() => "a table".to_owned(),
                 Some("object") => format!("a table of {}", quoted(self.keys(None))),
                 other => other.unwrap_or("something else").to_owned(),
