@@ -39,11 +39,15 @@ struct Sources {
 /// A `--set a.b=value`.
 #[derive(Debug)]
 struct Set {
+    /// The option: `--set` or `--vary`.
+    option: &'static str,
     argument: Arc<String>,
     /// The text before `=`.
     key: String,
     /// Byte at which the value begins in the argument.
     value_at: usize,
+    /// Number of names in the key.
+    depth: usize,
     /// The key and the value as nested tables.
     table: Table,
     path: Vec<String>,
@@ -52,7 +56,8 @@ struct Set {
 impl RecipeFile {
     /// Reads the recipe and applies the changes of the command line.
     pub(crate) fn load(args: &RecipeArgs) -> Result<Self, ExitError> {
-        let sets = args.set.iter().map(|argument| Set::parse(argument)).collect::<Result<Vec<_>, _>>()?;
+        let given = args.set.iter().map(|set| ("--set", set)).chain(args.vary.iter().map(|set| ("--vary", set)));
+        let sets = given.map(|(option, argument)| Set::parse(option, argument)).collect::<Result<Vec<_>, _>>()?;
         let (mut base, file, folder) = match &args.recipe {
             None => (args.preset.unwrap_or(Preset::Lbc).recipe(), None, PathBuf::new()),
             Some(path) => {
@@ -184,7 +189,9 @@ impl Sources {
             None => ErrorReport::new(message),
         };
         if let Some(set) = self.sets.iter().rev().find(|set| set.touches(&fault.path)) {
-            return report(fault.message).at("--set", &set.argument, set.value_at..set.argument.len());
+            let is_key = fault.message.starts_with("unknown key") && fault.path.len() <= set.depth;
+            let span = if is_key { 0..set.value_at - 1 } else { set.value_at..set.argument.len() };
+            return report(fault.message).at(set.option, &set.argument, span);
         }
         match &self.file {
             Some((name, text)) => match fault.span.or_else(|| diagnose::find(text, &fault.path)) {
@@ -197,11 +204,11 @@ impl Sources {
 }
 
 impl Set {
-    fn parse(argument: &str) -> Result<Self, ExitError> {
+    fn parse(option: &'static str, argument: &str) -> Result<Self, ExitError> {
         let text = Arc::new(argument.to_owned());
         let wrong = |message: &str, span| {
             let help = "examples: --set field.width_px=512, --set 'slide.depth_um={ uniform = [2, 6] }'";
-            ExitError::from(ErrorReport::new(message).at("--set", &text, span).help(help))
+            ExitError::from(ErrorReport::new(message).at(option, &text, span).help(help))
         };
         let Some((key, value)) = argument.split_once('=') else {
             return Err(wrong("expected KEY=VALUE", 0..argument.len()));
@@ -211,8 +218,11 @@ impl Set {
         let is_word = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.' | '/');
         let parse = |value: &str| toml::from_str::<Table>(&format!("{key} = {value}\n"));
         let trimmed = value.trim();
+        if trimmed.is_empty() {
+            return Err(wrong("the value is missing: expected KEY=VALUE", 0..argument.len()));
+        }
         let table = match parse(value) {
-            Err(_) if !trimmed.is_empty() && trimmed.chars().all(is_word) && trimmed.parse::<f64>().is_err() => {
+            Err(_) if trimmed.chars().all(is_word) && trimmed.parse::<f64>().is_err() => {
                 parse(&Value::String(trimmed.to_owned()).to_string())
             }
             other => other,
@@ -221,10 +231,11 @@ impl Set {
             let at = error.span().map_or(value_at, |s| s.start);
             // The parsed text has ` = ` where the argument has `=`.
             let at = if at > key.len() { at.saturating_sub(2).max(value_at) } else { at };
-            wrong(error.message(), at.min(argument.len())..argument.len())
+            wrong(&diagnose::plain(error.message()), at.min(argument.len())..argument.len())
         })?;
         let path = leaf(&table);
-        Ok(Self { argument: text.clone(), key: key.trim().to_owned(), value_at, table, path })
+        let depth = parse("0").map_or(path.len(), |table| leaf(&table).len());
+        Ok(Self { option, argument: text.clone(), key: key.trim().to_owned(), value_at, depth, table, path })
     }
 
     /// Whether one of the two paths contains the other.
@@ -282,7 +293,15 @@ mod tests {
 
     fn load(preset: Preset, sets: &[&str]) -> Result<Recipe, String> {
         let set = sets.iter().map(|&s| s.to_owned()).collect();
-        let args = RecipeArgs { recipe: None, preset: Some(preset), with: Vec::new(), camera: None, widen: None, set };
+        let args = RecipeArgs {
+            recipe: None,
+            preset: Some(preset),
+            with: Vec::new(),
+            camera: None,
+            widen: None,
+            set,
+            vary: Vec::new(),
+        };
         RecipeFile::load(&args).map(|found| found.recipe).map_err(|error| error.json().to_string())
     }
 
@@ -343,7 +362,12 @@ mod tests {
             ("field.width_px=nan", "field.width_px: NaN"),
             ("field.width_px=wide", "expected a number, found a string"),
             ("field.width_px", "expected KEY=VALUE"),
-            ("field.width_px=", "--set"),
+            ("field.width_px=", "the value is missing"),
+            ("field.width_px= ", "the value is missing"),
+            ("field.width_px=99999999999999999999999", "the integer 99999999999999999999999 is too large"),
+            ("stain.slide_nucleus={uniform=[1,2,9]}", "expected 2 numbers in `uniform`, found 3"),
+            ("field.widht_px=5", "\"column\":1}"),
+            ("field.width_px={unifrom=[1,2]}", "\"column\":16}"),
             ("=3", "--set"),
             ("field.width_px=[1,", "--set"),
             ("field=3", "field: expected a table, found an integer"),

@@ -83,6 +83,7 @@ fn load(args: &Rerender, seed: u64, changed: bool) -> Result<Setup, ExitError> {
             camera: args.camera.filter(|_| changed),
             widen: None,
             set: if changed { args.set.clone() } else { Vec::new() },
+            vary: Vec::new(),
         },
         model: Some(args.dir.join("model.json")),
         seed,

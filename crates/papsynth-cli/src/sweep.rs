@@ -159,7 +159,7 @@ fn combinations(axes: &[Axis]) -> Vec<Vec<&str>> {
 
 fn setup(args: &Sweep, axes: &[Axis], values: &[&str]) -> Result<Setup, ExitError> {
     let mut engine = args.engine.clone();
-    engine.recipe.set.extend(axes.iter().zip(values).map(|(axis, value)| format!("{}={value}", axis.field)));
+    engine.recipe.vary = axes.iter().zip(values).map(|(axis, value)| format!("{}={value}", axis.field)).collect();
     Setup::load(&engine, None)
 }
 

@@ -34,6 +34,9 @@ pub(crate) struct RecipeArgs {
     /// Set one parameter of the recipe, also where the recipe has [[conditions]]; repeatable, the last value counts
     #[arg(long, value_name = "KEY=VALUE", allow_hyphen_values = true)]
     pub(crate) set: Vec<String>,
+    /// As `set`, from `--vary` of `papsynth sweep`.
+    #[arg(skip)]
+    pub(crate) vary: Vec<String>,
 }
 
 /// Options of the engine.
