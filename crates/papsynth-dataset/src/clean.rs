@@ -18,8 +18,8 @@ pub struct Cleaned {
     pub temporary: Vec<String>,
     /// Untracked files: other files that do not belong to the data set.
     pub untracked: Vec<String>,
-    /// Number of files of both kinds that were not removed: another process writes them, another user owns them, or their names
-    /// are not UTF-8.
+    /// Number of files of both kinds that were not removed: another process writes them, another user owns them, or
+    /// their names are not UTF-8.
     pub skipped: u64,
 }
 

@@ -55,8 +55,8 @@ pub struct MemoryPlan {
 }
 
 impl MemoryEstimate {
-    /// Returns the estimate for the largest frame of a recipe and a model. `tests/memory.rs` of papsynth-cli measures the
-    /// constants.
+    /// Returns the estimate for the largest frame of a recipe and a model. `tests/memory.rs` of papsynth-cli measures
+    /// the constants.
     #[must_use]
     pub fn of(recipe: &Recipe, model: &Model, layout: &Layout) -> Self {
         Self::largest(recipe, |recipe| Self::without_conditions(recipe, model, layout))
