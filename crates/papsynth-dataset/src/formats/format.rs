@@ -302,8 +302,8 @@ impl Layout {
         let each = self.frames_per_shard;
         (!frames.is_empty() && !frames.start.is_multiple_of(each)).then(|| {
             format!(
-                "frames {}..{} begin within a shard of {each} frames; expected a start that is a multiple of {each}; or \
-                 use --format folder, or --frames-per-shard 1, for all frames of the data set",
+                "frames {}..{} begin within a shard of {each} frames; expected a start that is a multiple of {each}; \
+                 or use --format folder, or --frames-per-shard 1, for all frames of the data set",
                 frames.start, frames.end
             )
         })

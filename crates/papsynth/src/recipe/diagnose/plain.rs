@@ -85,7 +85,8 @@ mod tests {
     #[test]
     fn no_message_has_a_type_of_rust() {
         let valid = serde_json::json!({
-            "number": 1.5, "count": 3, "pair": [1, 2], "list": [1], "tagged": { "kind": "A", "pair": [1, 2] }, "word": "B",
+            "number": 1.5, "count": 3, "pair": [1, 2], "list": [1], "word": "B",
+            "tagged": { "kind": "A", "pair": [1, 2] },
         });
         serde_json::from_value::<All>(valid.clone()).unwrap();
         for path in ["", "/number", "/count", "/pair", "/list", "/tagged", "/tagged/kind", "/tagged/pair", "/word"] {
