@@ -59,7 +59,7 @@ fn an_edited_scene_is_rendered_and_an_invalid_one_is_rejected_by_object_and_fiel
     assert!(pixels(&bench, "edited.png") != pixels(&bench, "set/images/000000.png"));
     for (field, to, said) in [
         ("depth_um", Value::from("deep"), "objects[0] (id 1): depth_um: expected a number, found \"deep\""),
-        ("centre_um", vec![1e300, 0.0].into(), "objects[0] (id 1): centre_um: 1000"),
+        ("centre_um", vec![1e300, 0.0].into(), "objects[0] (id 1): centre_um: 1e300 is out of range"),
         ("colour", "red".into(), "objects[0] (id 1): unknown field `colour`"),
         ("id", Value::Null, "objects[0] (id null)"),
     ] {
