@@ -122,7 +122,7 @@ fn verify_in(
     if !unreadable.is_empty() {
         listed.extend(listed_files(folder, |shard| unreadable.contains(&shard))?);
     }
-    // A merged data set that lists exactly these shards is complete, from any ranges.
+    // A merged data set that lists exactly these shards is complete, also if its ranges have gaps.
     let is_merged = expected.is_none() && closed == recorded.len() as u64 && !merged.is_empty();
     let expected = expected.unwrap_or_else(|| 0..present.last().map_or(0, |last: &u64| last + 1).max(known));
     let (not_generated, missing) = match is_merged {
