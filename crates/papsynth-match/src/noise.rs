@@ -52,6 +52,33 @@ pub(crate) fn noise_by_darkness(grey: &[f32], width: usize, empty: f64) -> [f64;
     std::array::from_fn(|i| libm::log(levels[i + 1] / levels[0]))
 }
 
+/// Standard deviations of the Gaussians between which texture is measured, pixels.
+const TEXTURE_PX: [f64; 4] = [0.7, 1.4, 2.8, 5.6];
+
+/// Standard deviation of the Gaussian after which a pixel is in a range of absorbance, pixels.
+const LEVEL_PX: f64 = 4.0;
+
+/// Minimum number of pixels of a range.
+const LEAST_TEXTURE: usize = 2000;
+
+/// Number of values of [`texture_by_darkness`].
+const TEXTURES: usize = (TEXTURE_PX.len() - 1) * DARK_BINS;
+
+/// Returns the logarithm of the texture of absorbance in the dark ranges, for each of the bands from fine to coarse; NaN
+/// for ranges without pixels. Texture is the median magnitude, which edges hardly change.
+pub(crate) fn texture_by_darkness(grey: &[f32], width: usize, empty: f64) -> [f64; TEXTURES] {
+    let absorbance: Vec<f32> = grey.iter().map(|g| -libm::log10f((g / single(empty)).max(1e-3))).collect();
+    let level = blur(&absorbance, width, LEVEL_PX);
+    let smooth = TEXTURE_PX.map(|sigma| blur(&absorbance, width, sigma));
+    std::array::from_fn(|i| {
+        let (band, [from, to]) = (i / DARK_BINS, BINS[1 + i % DARK_BINS]);
+        let values = level.iter().zip(&smooth[band]).zip(&smooth[band + 1]);
+        let inside = values.filter(|((level, _), _)| (from..to).contains(&f64::from(**level)));
+        let mut magnitudes: Vec<f64> = inside.map(|((_, fine), coarse)| f64::from((fine - coarse).abs())).collect();
+        if magnitudes.len() < LEAST_TEXTURE { f64::NAN } else { libm::log(quantile(&mut magnitudes, 0.5).max(1e-6)) }
+    })
+}
+
 /// Standard deviations of the Gaussians of the band in which unevenness is measured, pixels.
 const UNEVEN_PX: [f64; 2] = [6.0, 24.0];
 
@@ -240,6 +267,30 @@ mod tests {
         // Variances of 2 and of 1 % of 220, on 1.2·10⁵ pixels.
         assert!((fields[0].deviation / (4.0_f64 + 4.84).sqrt() - 1.0).abs() < 0.02, "{}", fields[0].deviation);
         assert!(fields[0].correlation.iter().all(|s| s.abs() < 0.02), "{:?}", fields[0].correlation);
+    }
+
+    #[test]
+    fn texture_is_measured_in_each_range_whatever_the_edges() {
+        let (width, height, empty) = (240, 200, 200.0);
+        // Three ranges of absorbance with noise of 2, 4 and 3 % of the light.
+        let grains = noise(5, width * height, 1.0);
+        let image = |edges: bool| -> Vec<f32> {
+            let pixel = |i: usize| {
+                let (x, y) = (i % width, i / width);
+                let (absorbance, sd) = [(0.08, 0.02), (0.18, 0.04), (0.4, 0.03)][x / 80];
+                let line = if edges && y % 50 < 2 { 0.8 } else { 1.0 };
+                200.0 * libm::powf(10.0, -absorbance) * (1.0 + sd * grains[i]) * line
+            };
+            (0..width * height).map(pixel).collect()
+        };
+        let (plain, edged) = [false, true].map(|edges| texture_by_darkness(&image(edges), width, empty)).into();
+        for band in 0..TEXTURES / DARK_BINS {
+            let [a, b, c] = [0, 1, 2].map(|bin| plain[band * DARK_BINS + bin]);
+            assert!((b - a - libm::log(2.0)).abs() < 0.15 && (c - a - libm::log(1.5)).abs() < 0.15, "{plain:?}");
+        }
+        assert!(plain[..3].iter().zip(&edged).all(|(a, b)| (a - b).abs() < 0.15), "{plain:?} {edged:?}");
+        let empty_slide = vec![200.0; width * height];
+        assert!(texture_by_darkness(&empty_slide, width, empty).iter().all(|value| value.is_nan()));
     }
 
     #[test]

@@ -152,7 +152,9 @@ impl Summary {
         for (name, value) in scalars(s) {
             all.put(name, value);
         }
-        for (name, value) in papsynth_judge::CYTOPLASM_NAMES.into_iter().zip(s.cytoplasm) {
+        // The power of windows inside cells depends on the number of layers; the texture below does not.
+        let in_windows = papsynth_judge::CYTOPLASM_NAMES.into_iter().zip(s.cytoplasm);
+        for (name, value) in in_windows.filter(|(name, _)| !name.starts_with("cytoplasm power")) {
             all.put(name, value);
         }
         for (i, power) in s.spectrum.iter().enumerate() {
@@ -163,6 +165,9 @@ impl Summary {
         }
         for (i, noise) in (1..).zip(noise::noise_by_darkness(grey, width, empty)) {
             all.put(format!("noise in the dark, bin {i}"), noise);
+        }
+        for (i, texture) in (1..).zip(noise::texture_by_darkness(grey, width, empty)) {
+            all.put(format!("texture in the dark, value {i}"), texture);
         }
         let [fine, coarse] = noise::unevenness(grey, width, empty);
         all.put("unevenness of the light, finely", fine);

@@ -5,7 +5,11 @@
 //! short lines along rows and columns appear, as fusion by wavelets produces them (Forster et al. 2004,
 //! doi:10.1002/jemt.20092). Correlations and lines were measured on real EDF images.
 
+use multiversion::multiversion;
+
 use crate::scene::Fusion;
+
+mod wavelet;
 
 /// Filters the noise, the difference between grey levels and expected grey levels, so that neighbours are correlated.
 ///
@@ -25,10 +29,11 @@ pub(crate) fn correlate(
     }
     let [input_top, top] = bits.map(|bits| ((1_u32 << bits.min(16)) - 1) as f32);
     let scale = top / input_top;
-    let own: Vec<f32> = grey.iter().zip(&*expected).map(|(grey, mean)| scale * (f32::from(*grey) - mean)).collect();
+    let mut own: Vec<f32> = grey.iter().zip(&*expected).map(|(grey, mean)| scale * (f32::from(*grey) - mean)).collect();
     expected.iter_mut().for_each(|mean| *mean *= scale);
     let expected = &*expected;
     let variance = own.iter().map(|n| f64::from(n * n)).sum::<f64>() / own.len() as f64;
+    select_largest(&mut own, expected, width, channels);
     // Rounding adds uncorrelated noise.
     let rounding_gain = 1.0 + ROUNDING / variance.max(ROUNDING);
     let correlation = fusion.noise_correlation.map(|wanted| (wanted * rounding_gain).min(MAX_CORRELATION));
@@ -95,6 +100,76 @@ pub(crate) fn correlate(
                 + LINES * bright * structured * lines[at];
             *grey = (expected[at] + value + 0.5).clamp(0.0, top) as u16;
         }
+    }
+}
+
+/// Scales of the wavelets by which planes are fused.
+const LEVELS: u32 = 2;
+
+/// Changes white noise as fusion by wavelets does, which takes the largest coefficient of several planes: coefficients
+/// keep their variance, but their magnitudes differ less than those of normal deviates. The noise stays white.
+///
+/// Each coefficient becomes proportional to the root of its magnitude, which gives about the binary patterns of the
+/// noise of real EDF images.
+fn select_largest(noise: &mut [f32], expected: &[f32], width: usize, channels: usize) {
+    let row = width * channels;
+    let [columns, rows] = [width, noise.len() / row].map(|side| side >> LEVELS << LEVELS);
+    if columns == 0 || rows == 0 {
+        return;
+    }
+    for channel in 0..channels {
+        let indices = || (0..rows).flat_map(|y| (0..columns).map(move |x| y * row + x * channels + channel));
+        let model = NoiseModel::new(indices().map(|i| [expected[i], noise[i]]));
+        let mut unit: Vec<f32> = indices().map(|i| noise[i] / model.deviation(expected[i])).collect();
+        wavelet::forward(&mut unit, columns, LEVELS);
+        for (y, line) in unit.chunks_exact_mut(columns).enumerate() {
+            let means = if y < rows >> LEVELS { columns >> LEVELS } else { 0 };
+            equalise(&mut line[means..]);
+        }
+        wavelet::inverse(&mut unit, columns, LEVELS);
+        indices().zip(unit).for_each(|(i, unit)| noise[i] = unit * model.deviation(expected[i]));
+    }
+}
+
+/// The standard deviation of noise as a function of the expected grey level: its square is linear.
+struct NoiseModel {
+    level: f64,
+    square: f64,
+    slope: f64,
+}
+
+impl NoiseModel {
+    /// Fits the model to pairs of expected grey level and noise by least squares.
+    fn new(pixels: impl Iterator<Item = [f32; 2]>) -> Self {
+        let [mut count, mut level, mut square, mut level_level, mut level_square] = [0.0_f64; 5];
+        for [expected, noise] in pixels {
+            let (x, y) = (f64::from(expected), f64::from(noise * noise));
+            count += 1.0;
+            level += x;
+            square += y;
+            level_level += x * x;
+            level_square += x * y;
+        }
+        let [level, square] = [level, square].map(|sum| sum / count);
+        let spread = level_level / count - level * level;
+        let slope = if spread > 1.0 { (level_square / count - level * square) / spread } else { 0.0 };
+        Self { level, square, slope }
+    }
+
+    fn deviation(&self, expected: f32) -> f32 {
+        let least = (0.1 * self.square).max(1e-6);
+        (self.square + self.slope * (f64::from(expected) - self.level)).max(least).sqrt() as f32
+    }
+}
+
+/// Replaces unit normal deviates by numbers proportional to the roots of their magnitudes, with the same sign and
+/// variance.
+#[multiversion(targets = "simd")]
+fn equalise(values: &mut [f32]) {
+    // The mean magnitude is the root of 2/π.
+    let norm = core::f32::consts::FRAC_PI_2.sqrt();
+    for value in values {
+        *value = (norm * value.abs()).sqrt().copysign(*value);
     }
 }
 
@@ -255,6 +330,37 @@ mod tests {
         }
         let skew = 0.5 * (product(&noise, WIDTH + 1) - product(&noise, WIDTH - 1)) / variance;
         assert!((skew - 0.02).abs() < 0.008, "{skew}");
+    }
+
+    #[test]
+    fn coefficients_of_noise_differ_less_than_normal_deviates() {
+        let (width, height) = (WIDTH, 240);
+        // Noise whose variance is proportional to the grey level.
+        let level = |i: usize| if i % width < width / 2 { 400.0_f32 } else { 1600.0 };
+        let expected: Vec<f32> = (0..width * height).map(level).collect();
+        let mut rng = Key { seed: 4, index: 0 }.stream("test", 0, "noise");
+        let white: Vec<f32> = expected.iter().map(|e| e.sqrt() * random::normal(&mut rng) as f32).collect();
+        let mut noise = white.clone();
+        select_largest(&mut noise, &expected, width, 1);
+        for side in [0..width / 2, width / 2..width] {
+            let part = || (0..width * height).filter(|i| side.contains(&(i % width)));
+            let mean =
+                |f: &dyn Fn(f64) -> f64| part().map(|i| f(f64::from(noise[i]))).sum::<f64>() / part().count() as f64;
+            let variance = mean(&|n| n * n);
+            let expected = f64::from(level(side.start));
+            assert!((variance / expected - 1.0).abs() < 0.04, "{variance} {expected}");
+            let kurtosis = mean(&|n| n * n * n * n) / (variance * variance);
+            assert!((2.6..2.85).contains(&kurtosis), "{kurtosis}");
+        }
+        let noise: Vec<f64> = noise.iter().map(|n| f64::from(*n)).collect();
+        for step in [1, 2, WIDTH, WIDTH + 1] {
+            let found = product(&noise, step) / product(&noise, 0);
+            assert!(found.abs() < 0.015, "{step}: {found}");
+        }
+        // Sides too short for the wavelets.
+        let mut short = white[..6].to_vec();
+        select_largest(&mut short, &expected[..6], 3, 1);
+        assert_eq!(short, white[..6]);
     }
 
     #[test]

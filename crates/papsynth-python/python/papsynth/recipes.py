@@ -466,9 +466,7 @@ class Cytoplasm(Section):
     """Number of protrusions of the rim. From 0 to 20."""
 
     wrinkles: Number | None = None
-    """Number of wrinkles: narrow folds of double thickness. A third of them are rolled stretches of the rim. From 0 to
-    100.
-    """
+    """Number of wrinkles: ridges and pleats. A fifth of them are rolled stretches of the rim. From 0 to 100."""
 
     wrinkle_thickness: Number | None = None
     """Additional thickness at the crest of a wrinkle, relative to the flat sheet. Rolled stretches of the rim have 0.8
@@ -516,6 +514,11 @@ class Cytoplasm(Section):
 
     granules: Number | None = None
     """Number of granules of a granular cell per 100 µm². From 0 to 1000."""
+
+    specks: Number | None = None
+    """Number of specks per 100 µm²: dark dots and short rods, such as granules, or bacteria on the cell. From 0 to
+    1000.
+    """
 
     degeneration: Number | None = None
     """Degeneration: dark granular material at the rim and in patches, and a frayed rim. The number is the absorbance of

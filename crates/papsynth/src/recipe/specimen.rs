@@ -282,7 +282,7 @@ section! {
         notches: Number (given usize) = Number::log_normal(2.5, 0.9).at_most(14.0), 0..=20;
         /// Number of protrusions of the rim.
         protrusions: Number (given usize) = Number::log_normal(1.5, 0.9).at_most(9.0), 0..=20;
-        /// Number of wrinkles: narrow folds of double thickness. A third of them are rolled stretches of the rim.
+        /// Number of wrinkles: ridges and pleats. A fifth of them are rolled stretches of the rim.
         wrinkles: Number (given usize) = Number::log_normal(7.0, 0.6).at_most(60.0), 0..=100;
         /// Additional thickness at the crest of a wrinkle, relative to the flat sheet. Rolled stretches of the rim have
         /// 0.8 to 3 times this thickness.
@@ -307,12 +307,14 @@ section! {
         /// default gives the spectrum inside cells of real fields.
         texture: Number
             (given f64 as texture: "Standard deviation of the fine texture, relative to the absorbance of the cytoplasm.")
-            = 0.8, 0..=20;
+            = 1.0, 0..=20;
         /// Probability that a cell is granular.
         granular: Number (undrawn) = 0.14, 0..=1;
         /// Number of granules of a granular cell per 100 µm².
         granules: Number
             (given f64 as granules: "Number of granules per 100 µm², 0 if the cell is not granular.") = Number::log_normal(12.0, 0.6), 0..=1000;
+        /// Number of specks per 100 µm²: dark dots and short rods, such as granules, or bacteria on the cell.
+        specks: Number = Number::log_normal(2.0, 0.9).at_most(30.0), 0..=1000;
         /// Degeneration: dark granular material at the rim and in patches, and a frayed rim. The number is the
         /// absorbance of the material relative to the cytoplasm. Above 1, the material covers the cell.
         degeneration: Number (given f64) = 0.0, 0..=5;
@@ -441,7 +443,7 @@ section! {
         /// Factor by which the standard deviations of the strength of the fine texture of cytoplasm, between cells and
         /// between fields, are multiplied. Drawn once per field. Those of the model are measured on small areas, which
         /// also differ within a cell.
-        texture_variation: Number = 0.4, 0..=5;
+        texture_variation: Number = 0.8, 0..=5;
         /// Variation of the dye balance between slides: standard deviation of the logarithm of each dye's amount.
         slide_balance: Number = 0.15, 0..=2;
         /// Variation of the dye balance between the fields of a slide, as `slide_balance`.

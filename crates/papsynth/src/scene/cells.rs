@@ -217,8 +217,9 @@ fn draw_body(
     let textures = [0, 1].map(|_| drawn_kind(texture, stain.kind_of_texture, &mut texture_rng));
     let strength = &textures[0].strength;
     let deviation = strength.log_sd * random::normal(&mut texture_rng) + texture.field_log_sd * stain.cytoplasm_texture;
-    // The texture adds up at random over the thickness, as in `phantom/cell/detail.rs`.
-    detail.texture *= strength.median * libm::exp(stain.texture_variation * deviation) / thickness.sqrt();
+    // The texture adds up at random over the absorbing material, as in `phantom/cell/detail.rs`.
+    let darkness = (cytoplasm_absorbance / TEXTURE_ABSORBANCE).max(0.1);
+    detail.texture *= strength.median * libm::exp(stain.texture_variation * deviation) / darkness.sqrt();
     let fold = draw_fold(recipe, cytoplasm.pliability, rng);
     let distance = (nucleus.off_centre.mean + nucleus.off_centre.sd * random::normal(rng)).clamp(0.0, 1.0);
     // The nucleus stays inside the cell, which can be narrow.
@@ -298,6 +299,9 @@ fn drawn_kind<'a>(texture: &'a CytoplasmTexture, of_field: f64, rng: &mut Stream
     });
     found.unwrap_or(&texture.kinds[0])
 }
+
+/// Absorbance of a cell whose texture has the strength of the model.
+const TEXTURE_ABSORBANCE: f64 = 0.125;
 
 /// Fraction of the variation of the standard deviation of chromatin that is independent of the absorbance.
 const CONTRAST_SPREAD: f64 = 0.6;

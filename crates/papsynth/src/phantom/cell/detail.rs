@@ -1,6 +1,7 @@
 //! Detail of cytoplasm: clouds, flecks, fine texture, cytoskeleton, granules, endoplasm, halo.
 
 use multiversion::multiversion;
+use portable_numerics::elementary::exp_f32;
 use voronoi_cytoskeleton::{LineParams, draw_into};
 
 use super::fine_texture::FineTexture;
@@ -14,7 +15,7 @@ use crate::phantom::tile::{Point, Tile, scaled_about};
 use crate::random;
 use crate::scene::cell::CellDetail;
 
-/// Standard deviation of the absorbance profile of a granule, µm.
+/// Standard deviation of the absorbance profile of a granule or speck, µm.
 const GRANULE_UM: f64 = 0.28;
 
 /// Absorbance of a granule relative to the cytoplasm.
@@ -114,38 +115,94 @@ pub(super) fn add_cytoskeleton(
 }
 
 /// Adds keratohyalin granules: small dark dots throughout the cell.
-pub(super) fn add_granules(absorbance: &mut Tile, coverage: &Tile, per_100_um2: f64, pixel_um: f64, rng: &mut Stream) {
-    if per_100_um2 <= 0.0 {
-        return;
-    }
-    let area_um2 = coverage.sum() * pixel_um * pixel_um;
-    let wanted = random::count(per_100_um2 * area_um2 / 100.0);
-    let (width, height) = (absorbance.width, absorbance.height());
-    // Granules are drawn in the bounding box, so that the expected number inside the cell is right.
-    let box_um2 = (width * height) as f64 * pixel_um * pixel_um;
-    let mut across = Vec::new();
-    for _ in 0..random::count(wanted as f64 * box_um2 / area_um2.max(1e-9)) {
-        let (x, y) = (random::between(0.0, width as f64, rng), random::between(0.0, height as f64, rng));
+pub(super) fn add_granules(absorbance: &mut Tile, per_100_um2: f64, pixel_um: f64, rng: &mut Stream) {
+    for _ in 0..count_in_box(absorbance, per_100_um2, pixel_um, rng) {
+        let at = [absorbance.width, absorbance.height()].map(|side| random::between(0.0, side as f64, rng));
         let sigma = GRANULE_UM / pixel_um * random::between(0.6, 1.3, rng);
-        let strength = GRANULE * random::between(0.3, 1.5, rng);
-        let reach = (3.0 * sigma).ceil();
-        let span = |at: f64| ((at - reach) as i64).max(0)..(at + reach) as i64 + 1;
-        let fall = |away: f64| libm::exp(-away * away / (2.0 * sigma * sigma));
-        across.clear();
-        across.extend(span(x).take_while(|px| *px < width as i64).map(|px| fall(px as f64 - x)));
-        let left = usize::try_from(span(x).start).unwrap_or(0);
-        for py in span(y).take_while(|py| *py < height as i64) {
-            let peak = strength * fall(py as f64 - y);
-            let at = usize::try_from(py).unwrap_or(0) * width + left;
-            for (value, across) in absorbance.values[at..].iter_mut().zip(&across) {
-                *value += (peak * across) as f32;
+        Rod { ends: [at; 2], sigma, strength: GRANULE * random::between(0.3, 1.5, rng) }.draw(absorbance);
+    }
+}
+
+/// Fraction of specks that lie near the previous one, and the standard deviation of their distance in x and y, µm.
+const GROUPED: f64 = 0.5;
+const GROUP_UM: f64 = 2.5;
+
+/// Fraction of specks that are rods, and their length, µm: minimum, maximum.
+const RODS: f64 = 0.6;
+const ROD_UM: [f64; 2] = [0.5, 2.5];
+
+/// Mean absorbance of a speck relative to the cytoplasm, and the maximum.
+const SPECK: [f64; 2] = [0.4, 1.6];
+
+/// Adds specks: dark dots and short rods, in groups. The rods of a cell have similar directions.
+pub(super) fn add_specks(absorbance: &mut Tile, cell: &CellContext<'_>) {
+    /// Standard deviation of the directions, radians.
+    const SPREAD: f64 = 0.7;
+    let (pixel_um, rng) = (cell.pixel_um(), &mut cell.stream("specks"));
+    let direction = random::direction(rng);
+    let sides = [absorbance.width, absorbance.height()];
+    let mut at = [0.0; 2];
+    for index in 0..count_in_box(absorbance, cell.body.detail.specks, pixel_um, rng) {
+        at = match index > 0 && random::chance(GROUPED, rng) {
+            true => at.map(|x| x + GROUP_UM / pixel_um * random::normal(rng)),
+            false => sides.map(|side| random::between(0.0, side as f64, rng)),
+        };
+        let length =
+            if random::chance(RODS, rng) { random::between(ROD_UM[0], ROD_UM[1], rng) / pixel_um } else { 0.0 };
+        let angle = direction + SPREAD * random::normal(rng);
+        let half = [0.5 * length * libm::cos(angle), 0.5 * length * libm::sin(angle)];
+        let ends = [[at[0] - half[0], at[1] - half[1]], [at[0] + half[0], at[1] + half[1]]];
+        let sigma = GRANULE_UM / pixel_um * random::between(0.6, 1.3, rng);
+        let strength = (-SPECK[0] * libm::log(1.0 - random::uniform(rng))).min(SPECK[1]);
+        Rod { ends, sigma, strength }.draw(absorbance);
+    }
+}
+
+/// Draws how many objects lie in the bounding box of a cell, so that the expected number inside the cell is right.
+fn count_in_box(like: &Tile, per_100_um2: f64, pixel_um: f64, rng: &mut Stream) -> usize {
+    if per_100_um2 <= 0.0 {
+        return 0;
+    }
+    let expected = per_100_um2 * (like.width * like.height()) as f64 * pixel_um * pixel_um / 100.0;
+    random::count(expected + random::uniform(rng) - 0.5)
+}
+
+/// A dark rod: a segment with a normal profile around it.
+struct Rod {
+    /// Ends, px in the tile.
+    ends: [Point; 2],
+    /// Standard deviation of the profile, px.
+    sigma: f64,
+    /// Absorbance on the segment relative to the cytoplasm.
+    strength: f64,
+}
+
+impl Rod {
+    fn draw(&self, absorbance: &mut Tile) {
+        let [from, to] = self.ends;
+        let along = [to[0] - from[0], to[1] - from[1]];
+        let square = (along[0] * along[0] + along[1] * along[1]).max(1e-12);
+        let reach = 3.0 * self.sigma;
+        let sides = [absorbance.width, absorbance.height()];
+        let [columns, rows] = [0, 1].map(|axis| {
+            let whole = |at: f64| at.clamp(0.0, sides[axis] as f64) as usize;
+            whole((from[axis].min(to[axis]) - reach).ceil())..whole(from[axis].max(to[axis]) + reach + 1.0)
+        });
+        for y in rows {
+            let row = &mut absorbance.values[y * sides[0]..][columns.clone()];
+            for (value, x) in row.iter_mut().zip(columns.clone()) {
+                let off = [x as f64 - from[0], y as f64 - from[1]];
+                let t = ((off[0] * along[0] + off[1] * along[1]) / square).clamp(0.0, 1.0);
+                let [dx, dy] = [off[0] - t * along[0], off[1] - t * along[1]];
+                let exponent = -(dx * dx + dy * dy) / (2.0 * self.sigma * self.sigma);
+                *value += self.strength as f32 * exp_f32(exponent as f32);
             }
         }
     }
 }
 
 /// Increase of the irregularity of the outline of a cell with its degeneration.
-const FRAYED: f64 = 1.5;
+const FRAYED: f64 = 0.5;
 
 /// Returns the amplitude of the irregularity of the outline, µm.
 pub(super) fn fray_um(detail: &CellDetail) -> f64 {
@@ -168,6 +225,11 @@ const OF_PATCHES: f32 = 0.4;
 /// Absorbance of the material relative to its strength: mean, and standard deviation of the grains of each size.
 const MATERIAL: f32 = 0.8;
 const GRAINS: f32 = 0.28;
+
+/// Material crumbles at the rim: the fraction of it that is there is the first number at the rim, rises by the second
+/// one over the width of the zone, and varies between clumps.
+const WHOLE: f32 = -0.5;
+const CRUMBLING: f32 = 8.0;
 
 /// Adds the granular material of a degenerated cell.
 pub(super) fn add_degeneration(absorbance: &mut Tile, coverage: &Tile, cell: &CellContext<'_>) {
@@ -203,7 +265,8 @@ fn encrust(row: &mut [f32], fields: [&[f32]; 4], sums: &[f32], weight: f32, stre
     for ((value, (((fine, coarse), clumps), patches)), sum) in row.iter_mut().zip(grains).zip(sums) {
         let margin = 1.0 - (2.0 * weight * sum - 1.0).clamp(0.0, 1.0);
         let covered = (inside + AT_RIM * margin + OF_PATCHES * patches).clamp(0.0, 1.0);
-        let grain = MATERIAL + GRAINS * (fine + coarse + clumps);
+        let whole = (WHOLE + (1.0 - margin) * CRUMBLING + clumps).clamp(0.0, 1.0);
+        let grain = whole * (MATERIAL + GRAINS * (fine + coarse + clumps));
         *value += strength * covered * if grain > 0.0 { grain } else { 0.0 };
     }
 }
@@ -523,11 +586,15 @@ mod tests {
     #[test]
     fn degenerated_material_lies_at_the_rim_and_in_patches() {
         let grains = [0.5_f32; 4];
-        // The mean coverage around: at a straight rim, half inside the margin, and twice inside.
-        let [sums, patches] = [[0.5, 0.75, 1.0, 1.0], [0.0, 0.0, 0.0, 2.0]];
-        let mut row = [0.2_f32; 4];
-        encrust(&mut row, [&grains, &grains, &grains, &patches], &sums, 1.0, 0.3);
-        assert!(row[0] > row[1] && row[1] > row[2] && row[2] == 0.2 && row[3] > 0.2, "{row:?}");
+        // The mean coverage around: at three places of the margin, and twice inside. Patches at the last place.
+        let [sums, patches] = [[0.5, 0.6, 0.75, 1.0, 1.0], [0.0, 0.0, 0.0, 0.0, 2.0]];
+        let mut row = [0.2_f32; 5];
+        let fields: [&[f32]; 4] = [&[0.5; 5], &[0.5; 5], &[0.5; 5], &patches];
+        encrust(&mut row, fields, &sums, 1.0, 0.3);
+        // Material crumbles at the rim.
+        assert!(row[0] == 0.2 && row[1] > row[2] && row[2] > row[3] && row[3] == 0.2 && row[4] > 0.2, "{row:?}");
+        let patches = [0.0, 0.0, 0.0, 2.0];
+        let sums = [0.6, 0.75, 1.0, 1.0];
         let mut row = [0.2_f32; 4];
         encrust(&mut row, [&[-2.0; 4], &[-2.0; 4], &[-2.0; 4], &patches], &sums, 1.0, 0.3);
         assert_eq!(row, [0.2; 4]);

@@ -8,6 +8,8 @@ mod fine_texture;
 mod outline;
 mod wrinkles;
 
+use wrinkles::Wrinkles;
+
 use crate::error::ErrorKind;
 use crate::key::Stream;
 use crate::phantom::assets::{ClassAssets, PhantomAssets};
@@ -137,11 +139,15 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
         let folded = pieces.iter().map(|piece| crease_outline(piece, crease)).collect::<Result<Vec<_>, _>>();
         pieces = folded?.concat();
     }
+    let wrinkles = Wrinkles::new(&plan.outline, cell);
     let rough: Vec<Vec<Point>> = pieces
         .iter()
         .map(|p| {
-            let on_crease = |p: Point| plan.creases.iter().any(|crease| crease.distance_beyond(p) > 0.0);
-            outline::roughened(p, detail::fray_um(&body.detail) / pixel_um, RIM_STEP_UM / pixel_um, on_crease, &mut rng)
+            let roughness = |p: Point| {
+                let on_crease = plan.creases.iter().any(|crease| crease.distance_beyond(p) > 0.0);
+                if on_crease { 0.0 } else { wrinkles.roughness(p, pixel_um) }
+            };
+            outline::roughened(p, detail::fray_um(&body.detail) / pixel_um, RIM_STEP_UM / pixel_um, roughness, &mut rng)
         })
         .collect();
     let mut coverage = Tile::around(rough.iter().flatten(), 3.0);
@@ -174,14 +180,15 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
     }
     let nucleus = [0, 1].map(|axis| plan.centre[axis] + body.nucleus.off_centre[axis] * body.radius_um / pixel_um);
     let mut canvas = vec![0.0; absorbance.values.len() + wrinkles::LANES];
-    wrinkles::add(&mut absorbance, &coverage, &plan.outline, cell, &mut canvas);
+    wrinkles.add(&mut absorbance, &coverage, &mut canvas);
     let inner = detail::add_endoplasm(&mut absorbance, &plan.outline, nucleus, cell);
     detail::add_halo(&mut absorbance, nucleus, cell);
     detail::add_detail(&mut absorbance, &coverage, inner, cell, &mut rng)?;
     let lines = &mut canvas[..coverage.values.len()];
     detail::add_cytoskeleton(&mut absorbance, &plan.outline, cell, lines, &mut rng)?;
     detail::add_degeneration(&mut absorbance, &coverage, cell);
-    detail::add_granules(&mut absorbance, &coverage, body.detail.granules, pixel_um, &mut rng);
+    detail::add_specks(&mut absorbance, cell);
+    detail::add_granules(&mut absorbance, body.detail.granules, pixel_um, &mut rng);
     // Eq. 12: A = κ·c·l.
     let strength = body.cytoplasm_absorbance.max(MIN_ABSORBANCE) as f32;
     absorbance.values.iter_mut().zip(&coverage.values).for_each(|(value, cover)| *value *= cover * strength);

@@ -142,15 +142,19 @@ fn displaced(outline: &[Point], depth: f64, rng: &mut Stream) -> Vec<Point> {
         .collect()
 }
 
-/// Amplitude of the medium-scale roughness of the rim (a few micrometres), relative to the fine roughness.
-const MEDIUM_SCALE: f64 = 1.0;
+/// Amplitude of the roughness of a scale below a micrometre, relative to that of a few micrometres.
+const FINE_SCALE: f64 = 0.75;
 
-/// Returns an outline with fine, irregular displacements, except where it is `smooth`: the frayed rim of a cell.
+/// Standard deviation of the logarithm of the roughness along a rim: parts of it are smooth and others torn.
+const UNEVENNESS: f64 = 0.7;
+
+/// Returns an outline with irregular displacements, the frayed rim of a cell. `roughness` is a factor on them at each
+/// point.
 pub(super) fn roughened(
     outline: &[Point],
     depth_px: f64,
     step_px: f64,
-    smooth: impl Fn(Point) -> bool,
+    roughness: impl Fn(Point) -> f64,
     rng: &mut Stream,
 ) -> Vec<Point> {
     if depth_px < 0.05 || outline.len() < 3 {
@@ -158,9 +162,8 @@ pub(super) fn roughened(
     }
     let count = random::count(fsd_shape::perimeter(outline) / step_px).max(outline.len());
     let fine = fsd_shape::resample_along(outline, count);
-    // First-order autoregressions: the slow ones modulate the amplitudes of the others, so that parts of a rim are
-    // smooth and others frayed.
-    let [mut slow, mut fast, mut medium, mut slow_of_medium] = [(); 4].map(|()| random::normal(rng));
+    // First-order autoregressions: the slow one modulates the amplitude of the others.
+    let [mut slow, mut fast, mut medium] = [(); 3].map(|()| random::normal(rng));
     let step = |state: f64, memory: f64, rng: &mut Stream| {
         memory * state + (1.0 - memory * memory).sqrt() * random::normal(rng)
     };
@@ -169,13 +172,11 @@ pub(super) fn roughened(
             slow = step(slow, 0.985, rng);
             fast = step(fast, 0.6, rng);
             medium = step(medium, 0.88, rng);
-            slow_of_medium = step(slow_of_medium, 0.985, rng);
             let [before, here, after] = [fine[(i + count - 1) % count], fine[i], fine[(i + 1) % count]];
             let (tx, ty) = (after[0] - before[0], after[1] - before[1]);
             let length = (tx * tx + ty * ty).sqrt().max(1e-9);
-            let frayed = fast * (0.35 + slow.max(0.0)) + MEDIUM_SCALE * medium * (0.3 + slow_of_medium.max(0.0));
-            let push = if smooth(here) { 0.0 } else { 0.5 * depth_px * frayed };
-            let push = push.clamp(-2.5 * depth_px, 2.5 * depth_px);
+            let amplitude = 0.37 * libm::exp(UNEVENNESS * slow - 0.5 * UNEVENNESS * UNEVENNESS) * roughness(here);
+            let push = depth_px * (amplitude * (FINE_SCALE * fast + medium)).clamp(-2.5, 2.5);
             [here[0] + push * ty / length, here[1] - push * tx / length]
         })
         .collect()

@@ -1,4 +1,4 @@
-//! Wrinkles: narrow creases of doubled cytoplasm, along the rim, across the cell, or forked.
+//! Wrinkles: ridges and pleats of the cytoplasm, along the rim, across the cell, or forked.
 
 use core::ops::Range;
 
@@ -15,7 +15,7 @@ const STEP_UM: f64 = 0.5;
 
 /// Fraction of wrinkles that are a rolled stretch of the rim. This and the next three numbers were set so that lines
 /// along rims are about as dark and as frequent as in real fields (docs/decisions.md, "Rolled rims").
-const ROLLED: f64 = 0.35;
+const ROLLED: f64 = 0.2;
 /// Thickness of a rolled stretch relative to that of a wrinkle: minimum, maximum.
 const ROLLED_THICKNESS: [f64; 2] = [0.8, 3.0];
 /// Width of a rolled stretch (standard deviation of its profile), µm: minimum, maximum.
@@ -30,6 +30,13 @@ const THICKNESS: [f64; 2] = [0.4, 1.6];
 /// Fraction of the remaining wrinkles that fork off a previous one.
 const FORKED: f64 = 0.35;
 
+/// Fraction of the other wrinkles that are pleats: flat, with sharp sides, instead of ridges.
+const PLEATS: f64 = 0.4;
+/// Width of a pleat relative to that of a ridge: minimum, maximum.
+const PLEAT_WIDTH: [f64; 2] = [0.8, 1.8];
+/// Width of a wrinkle at its ends relative to its middle.
+const END_WIDTH: f64 = 0.4;
+
 /// Fraction of a wrinkle's length over which it rises or fades.
 const TAPER: f64 = 0.3;
 
@@ -38,49 +45,88 @@ const SLOPE: f64 = 0.30;
 /// Width of the slope, relative to the wrinkle.
 const SLOPE_WIDTH: f64 = 4.0;
 
-/// Adds the wrinkles of a cell to its thickness. `canvas` is an image of zeros before and after, of the same size, with
-/// a margin of [`LANES`] values at the end.
-pub(super) fn add(
-    thickness: &mut Tile,
-    coverage: &Tile,
-    outline: &[Point],
-    cell: &CellContext<'_>,
-    canvas: &mut [f32],
-) {
-    let (detail, pixel_um, rng) = (&cell.body.detail, cell.pixel_um(), &mut cell.stream("wrinkles"));
-    let step = STEP_UM / pixel_um;
-    let steps_round = || random::count(fsd_shape::perimeter(outline) / step).max(8);
-    let rim = if detail.wrinkles > 0 { fsd_shape::resample_along(outline, steps_round()) } else { Vec::new() };
-    let mut drawn: Vec<Vec<Point>> = Vec::new();
-    for _ in 0..detail.wrinkles {
-        let rolled = random::chance(ROLLED, rng);
-        let path = match random::uniform(rng) {
-            _ if rolled => along_rim(outline, &rim, random::between(ROLLED_INSET[0], ROLLED_INSET[1], rng), 0.0, rng),
-            u if u < ALONG_RIM => {
-                // Most wrinkles are near the rim, where a thin sheet folds freely.
-                let depth = random::uniform(rng);
-                along_rim(outline, &rim, 0.015 + 0.35 * depth * depth, random::between(-0.3, 0.3, rng), rng)
-            }
-            u if u < ALONG_RIM + (1.0 - ALONG_RIM) * FORKED && !drawn.is_empty() => {
-                let stem = &drawn[random::below(drawn.len(), rng)];
-                forked(stem, outline, step, rng)
-            }
-            _ => across(outline, step, rng),
-        };
-        let (width_um, thickness_range) = match rolled {
-            true => (random::between(ROLLED_UM[0], ROLLED_UM[1], rng), ROLLED_THICKNESS),
-            false => (detail.wrinkle_um * random::between(0.6, 1.6, rng), THICKNESS),
-        };
-        let profile = WrinkleProfile {
-            width: width_um / pixel_um,
-            strength: detail.wrinkle_thickness * random::between(thickness_range[0], thickness_range[1], rng),
-            side: if random::chance(0.5, rng) { 1.0 } else { -1.0 },
-            rise: random::between(0.05, TAPER, rng),
-            fall: random::between(0.1, 2.0 * TAPER, rng),
-            factors: random_factors(path.len(), rng),
-        };
-        profile.draw(&path, thickness, coverage, canvas);
-        drawn.push(path);
+/// A wrinkle before it is drawn.
+struct Wrinkle {
+    path: Vec<Point>,
+    profile: WrinkleProfile,
+}
+
+/// The wrinkles of a cell.
+pub(super) struct Wrinkles {
+    /// Rolled stretches of the rim.
+    rolled: Vec<Wrinkle>,
+    others: Vec<Wrinkle>,
+}
+
+impl Wrinkles {
+    /// Draws the wrinkles of a cell with this outline.
+    pub(super) fn new(outline: &[Point], cell: &CellContext<'_>) -> Self {
+        let (detail, pixel_um, rng) = (&cell.body.detail, cell.pixel_um(), &mut cell.stream("wrinkles"));
+        let mut wrinkles = Self { rolled: Vec::new(), others: Vec::new() };
+        if detail.wrinkles == 0 {
+            return wrinkles;
+        }
+        let step = STEP_UM / pixel_um;
+        let rim = fsd_shape::resample_along(outline, random::count(fsd_shape::perimeter(outline) / step).max(8));
+        for _ in 0..detail.wrinkles {
+            let rolled = random::chance(ROLLED, rng);
+            let others = &wrinkles.others;
+            let path = match random::uniform(rng) {
+                _ if rolled => {
+                    along_rim(outline, &rim, random::between(ROLLED_INSET[0], ROLLED_INSET[1], rng), 0.0, rng)
+                }
+                u if u < ALONG_RIM => {
+                    // Most wrinkles are near the rim, where a thin sheet folds freely.
+                    let depth = random::uniform(rng);
+                    along_rim(outline, &rim, 0.015 + 0.35 * depth * depth, random::between(-0.3, 0.3, rng), rng)
+                }
+                u if u < ALONG_RIM + (1.0 - ALONG_RIM) * FORKED && !others.is_empty() => {
+                    let stem = &others[random::below(others.len(), rng)];
+                    forked(&stem.path, outline, step, rng)
+                }
+                _ => across(outline, step, rng),
+            };
+            let pleat = !rolled && random::chance(PLEATS, rng);
+            let (width_um, thickness_range) = match rolled {
+                true => (random::between(ROLLED_UM[0], ROLLED_UM[1], rng), ROLLED_THICKNESS),
+                false => (detail.wrinkle_um * random::between(0.6, 1.6, rng), THICKNESS),
+            };
+            let factor = if pleat { random::between(PLEAT_WIDTH[0], PLEAT_WIDTH[1], rng) } else { 1.0 };
+            let profile = WrinkleProfile {
+                width: factor * width_um / pixel_um,
+                pleat,
+                strength: detail.wrinkle_thickness * random::between(thickness_range[0], thickness_range[1], rng),
+                side: if random::chance(0.5, rng) { 1.0 } else { -1.0 },
+                rise: random::between(0.05, TAPER, rng),
+                fall: random::between(0.1, 2.0 * TAPER, rng),
+                factors: random_factors(path.len(), rng),
+            };
+            let same = if rolled { &mut wrinkles.rolled } else { &mut wrinkles.others };
+            same.push(Wrinkle { path, profile });
+        }
+        wrinkles
+    }
+
+    /// Adds the wrinkles to the thickness of the cell. `canvas` is an image of zeros before and after, of the same
+    /// size, with a margin of [`LANES`] values at the end.
+    pub(super) fn add(&self, thickness: &mut Tile, coverage: &Tile, canvas: &mut [f32]) {
+        for Wrinkle { path, profile } in self.rolled.iter().chain(&self.others) {
+            profile.draw(path, thickness, coverage, canvas);
+        }
+    }
+
+    /// Returns the roughness of the rim at a point relative to the rest of the rim: a rolled stretch is smooth.
+    pub(super) fn roughness(&self, at: Point, pixel_um: f64) -> f64 {
+        /// Roughness along a rolled stretch.
+        const SMOOTH: f64 = 0.15;
+        /// Distances from a rolled stretch at which the roughness begins to rise and is that of the rest, µm.
+        const REACH_UM: [f64; 2] = [2.0, 6.0];
+        let [near, far] = REACH_UM.map(|um| um / pixel_um);
+        // Every fourth point of a path is close enough.
+        let points = self.rolled.iter().flat_map(|rolled| rolled.path.iter().step_by(4));
+        let square = |p: &Point| (p[0] - at[0]) * (p[0] - at[0]) + (p[1] - at[1]) * (p[1] - at[1]);
+        let distance = points.map(square).fold(far * far, f64::min).sqrt();
+        SMOOTH + (1.0 - SMOOTH) * ((distance - near) / (far - near)).max(0.0)
     }
 }
 
@@ -168,8 +214,10 @@ const EXTENT: [f64; 2] = [3.0, 2.2 * SLOPE_WIDTH];
 
 /// The size, strength and interruptions of a wrinkle.
 struct WrinkleProfile {
-    /// Standard deviation of the crest, px.
+    /// Standard deviation of the crest in the middle of the wrinkle, px.
     width: f64,
+    /// Whether the crest is flat.
+    pleat: bool,
     /// Thickness added at the crest, relative to a flat sheet.
     strength: f64,
     /// The side of the slope: 1 or −1.
@@ -193,9 +241,11 @@ impl WrinkleProfile {
             let ends = [ends[0], ends[1]].map(|p| [p[0] - origin[0], p[1] - origin[1]]);
             let t = (index as f64 + 0.5) / (path.len() - 1) as f64;
             let fade = (t / self.rise).min((1.0 - t) / self.fall).min(1.0);
-            let strength = self.strength * fade * (2.0 - fade) * factor;
+            let rise = fade * (2.0 - fade);
+            let strength = self.strength * rise * factor;
             if strength > 0.0 {
-                paint(&self.segment(ends, strength), canvas, width, &mut touched);
+                let of_crest = self.width * (END_WIDTH + (1.0 - END_WIDTH) * rise);
+                paint(&self.segment(ends, of_crest, strength), canvas, width, &mut touched);
             }
         }
         for (y, columns) in touched.into_iter().enumerate().filter(|(_, columns)| !columns.is_empty()) {
@@ -205,7 +255,7 @@ impl WrinkleProfile {
     }
 
     /// Returns one step of the wrinkle, between two points of the tile.
-    fn segment(&self, [a, b]: [Point; 2], strength: f64) -> Segment {
+    fn segment(&self, [a, b]: [Point; 2], width: f64, strength: f64) -> Segment {
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
         let length = (dx * dx + dy * dy).sqrt().max(f64::MIN_POSITIVE);
         let along = [dx / length, dy / length];
@@ -213,9 +263,10 @@ impl WrinkleProfile {
             from: a,
             along,
             off: [-self.side * along[1], self.side * along[0]],
-            range: [[-self.width, length + self.width], [-EXTENT[0] * self.width, EXTENT[1] * self.width]],
+            range: [[-width, length + width], [-EXTENT[0] * width, EXTENT[1] * width]],
             strength: strength as f32,
-            per_width: 1.0 / self.width,
+            per_width: 1.0 / width,
+            exponents: if self.pleat { PLEAT_EXPONENTS } else { RIDGE_EXPONENTS },
         }
     }
 }
@@ -232,7 +283,16 @@ struct Segment {
     strength: f32,
     /// 1/σ of the crest, px⁻¹.
     per_width: f64,
+    /// Coefficients of the square and of the fourth power of the distance from the crest, relative to its width, in the
+    /// exponent of its profile.
+    exponents: [f32; 2],
 }
+
+/// A normal distribution.
+const RIDGE_EXPONENTS: [f32; 2] = [-0.5, 0.0];
+
+/// Flat, with sharp sides.
+const PLEAT_EXPONENTS: [f32; 2] = [0.0, -0.3];
 
 impl Segment {
     /// Returns the rows of the image that it intersects.
@@ -278,7 +338,7 @@ pub(super) const LANES: usize = 16;
 fn paint(segment: &Segment, canvas: &mut [f32], width: usize, touched: &mut [Range<usize>]) {
     /// Rate at which the slope falls, per standard deviation of the crest.
     const RATE: f32 = (-1.0 / SLOPE_WIDTH) as f32;
-    let Segment { from, off, per_width, strength, .. } = *segment;
+    let Segment { from, off, per_width, strength, exponents, .. } = *segment;
     let step = (off[0] * per_width) as f32;
     // The slope falls by these factors from a pixel to the next ones. Loops, since closures are compiled separately.
     let mut falls = [0.0; LANES];
@@ -310,9 +370,10 @@ fn paint(segment: &Segment, canvas: &mut [f32], width: usize, touched: &mut [Ran
                 let left = (end - start) as f32;
                 for i in 0..LANES {
                     let off = first + step * i as f32;
-                    let gauss = exp_f32(-0.5 * off * off);
-                    let above = slope * falls[i] - SLOPE as f32 * gauss;
-                    let profile = strength * (gauss + if off > 0.0 { above } else { 0.0 });
+                    let square = off * off;
+                    let crest = exp_f32(square * (exponents[0] + exponents[1] * square));
+                    let above = slope * falls[i] - SLOPE as f32 * crest;
+                    let profile = strength * (crest + if off > 0.0 { above } else { 0.0 });
                     let profile = if (i as f32) < left { profile } else { 0.0 };
                     canvas[i] = if profile > canvas[i] { profile } else { canvas[i] };
                 }
@@ -343,14 +404,19 @@ fn add_and_clear(thickness: &mut [f32], cover: &[f32], painted: &mut [f32]) {
 mod tests {
     use super::*;
 
+    fn profile(width: f64, side: f64, pleat: bool) -> WrinkleProfile {
+        WrinkleProfile { width, pleat, strength: 1.0, side, rise: 0.1, fall: 0.1, factors: vec![1.0; 40] }
+    }
+
     #[test]
     fn a_segment_matches_its_profile() {
         let (width, height) = (90, 70);
-        for (side, direction) in [(1.0, 0.3), (-1.0, 2.0), (1.0, 0.0), (-1.0, -core::f64::consts::FRAC_PI_2)] {
-            let profile = WrinkleProfile { width: 2.3, strength: 0.0, side, rise: 0.0, fall: 0.0, factors: Vec::new() };
+        let cases = [(1.0, 0.3), (-1.0, 2.0), (1.0, 0.0), (-1.0, -core::f64::consts::FRAC_PI_2)];
+        for ((side, direction), pleat) in cases.into_iter().zip([false, true, true, false]) {
             let along = [libm::cos(direction), libm::sin(direction)];
             let [a, length] = [[40.3, 33.8], [7.0, 7.0]];
-            let segment = profile.segment([a, [a[0] + length[0] * along[0], a[1] + length[1] * along[1]]], 0.8);
+            let ends = [a, [a[0] + length[0] * along[0], a[1] + length[1] * along[1]]];
+            let segment = profile(9.0, side, pleat).segment(ends, 2.3, 0.8);
             let mut canvas = vec![0.0; width * height + LANES];
             let mut touched = vec![width..0; height];
             paint(&segment, &mut canvas, width, &mut touched);
@@ -360,9 +426,10 @@ mod tests {
                 let on = p[0] * along[0] + p[1] * along[1];
                 let off = side * (p[1] * along[0] - p[0] * along[1]);
                 let inside = (-2.3..=9.3).contains(&on) && (-6.9..=20.24).contains(&off);
-                let gauss = libm::exp(-0.5 * off * off / (2.3 * 2.3));
-                let slope = if off > 0.0 { SLOPE * (libm::exp(-off / (SLOPE_WIDTH * 2.3)) - gauss) } else { 0.0 };
-                let expected = if inside { 0.8 * (gauss + slope) } else { 0.0 };
+                let square = off * off / (2.3 * 2.3);
+                let crest = libm::exp(if pleat { -0.3 * square * square } else { -0.5 * square });
+                let slope = if off > 0.0 { SLOPE * (libm::exp(-off / (SLOPE_WIDTH * 2.3)) - crest) } else { 0.0 };
+                let expected = if inside { 0.8 * (crest + slope) } else { 0.0 };
                 assert!((f64::from(*value) - expected).abs() < 1e-5, "{direction}: {p:?} {value} {expected}");
                 painted += usize::from(inside);
                 assert!(!inside || touched[index / width].contains(&(index % width)), "{touched:?} {index}");
@@ -372,9 +439,19 @@ mod tests {
     }
 
     #[test]
+    fn the_rim_is_smooth_along_a_rolled_stretch() {
+        let path = (0..40).map(|i| [f64::from(i), 0.0]).collect();
+        let wrinkles =
+            Wrinkles { rolled: vec![Wrinkle { path, profile: profile(2.0, 1.0, false) }], others: Vec::new() };
+        let roughness = |x: f64, y: f64| wrinkles.roughness([x, y], 0.5);
+        assert!(roughness(20.0, 2.0) == roughness(8.0, 1.0) && roughness(20.0, 2.0) < 0.2);
+        assert!(roughness(20.0, 2.0) < roughness(45.0, 1.0) && roughness(45.0, 1.0) < 1.0);
+        assert_eq!(roughness(60.0, 0.0), 1.0);
+    }
+
+    #[test]
     fn parts_outside_the_tile_are_ignored() {
-        let profile =
-            WrinkleProfile { width: 2.0, strength: 1.0, side: 1.0, rise: 0.1, fall: 0.1, factors: vec![1.0; 40] };
+        let profile = profile(2.0, 1.0, false);
         let path: Vec<Point> = (0..40).map(|i| [f64::from(i) - 15.0, 0.4 * f64::from(i) - 9.0]).collect();
         let tile = Tile { origin: [-5, -3], width: 12, values: vec![1.0; 12 * 9] };
         let (mut drawn, mut canvas) = (tile.clone(), vec![0.0; 12 * 9 + LANES]);
