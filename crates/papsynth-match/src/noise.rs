@@ -64,8 +64,8 @@ const LEAST_TEXTURE: usize = 2000;
 /// Number of values of [`texture_by_darkness`].
 const TEXTURES: usize = (TEXTURE_PX.len() - 1) * DARK_BINS;
 
-/// Returns the logarithm of the texture of absorbance in the dark ranges, for each of the bands from fine to coarse; NaN
-/// for ranges without pixels. Texture is the median magnitude, which edges hardly change.
+/// Returns the logarithm of the texture of absorbance in the dark ranges, for each band from fine to coarse; NaN for
+/// ranges without pixels. Texture is the median magnitude, which edges hardly change.
 pub(crate) fn texture_by_darkness(grey: &[f32], width: usize, empty: f64) -> [f64; TEXTURES] {
     let absorbance: Vec<f32> = grey.iter().map(|g| -libm::log10f((g / single(empty)).max(1e-3))).collect();
     let level = blur(&absorbance, width, LEVEL_PX);

@@ -5,8 +5,8 @@ use multiversion::multiversion;
 
 /// Transforms an image in place, from the finest scale to the coarsest of `levels`.
 ///
-/// The means of each scale are in the left and upper halves, in which the next scale is transformed. Sides are multiples
-/// of 2 to the power of `levels`.
+/// The means of each scale are in the left and upper halves, in which the next scale is transformed. Sides are
+/// multiples of 2 to the power of `levels`.
 pub(super) fn forward(image: &mut [f32], width: usize, levels: u32) {
     let mut buffer = vec![0.0; image.len()];
     let height = image.len() / width;
