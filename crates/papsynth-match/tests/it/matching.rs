@@ -182,12 +182,12 @@ fn invalid_fields_and_parameters_are_errors_and_the_stop_flag_ends_a_match() {
             "{params:?}"
         );
     }
-    let fields = fields(2, NucleiFrom::Search, 0.0);
+    let fields = fields(4, NucleiFrom::Search, 0.0);
     let stop = AtomicBool::new(false);
     let after_three = |p: Progress| {
         // The count continues over all phases, so the time left is known from the start.
-        assert_eq!(p.total, 2 * 2 + 60 + 2 * 16);
-        if p.phase == "simulating fields" && p.done == 4 + 3 {
+        assert_eq!(p.total, 2 * 4 + 60 + 2 * 16);
+        if p.phase == "simulating fields" && p.done == 8 + 3 {
             stop.store(true, Ordering::Relaxed);
         }
     };
