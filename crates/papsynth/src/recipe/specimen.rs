@@ -307,7 +307,7 @@ section! {
         /// default gives the spectrum inside cells of real fields.
         texture: Number
             (given f64 as texture: "Standard deviation of the fine texture, relative to the absorbance of the cytoplasm.")
-            = 1.0, 0..=20;
+            = 0.8, 0..=20;
         /// Probability that a cell is granular.
         granular: Number (undrawn) = 0.14, 0..=1;
         /// Number of granules of a granular cell per 100 µm².
@@ -443,7 +443,7 @@ section! {
         /// Factor by which the standard deviations of the strength of the fine texture of cytoplasm, between cells and
         /// between fields, are multiplied. Drawn once per field. Those of the model are measured on small areas, which
         /// also differ within a cell.
-        texture_variation: Number = 0.8, 0..=5;
+        texture_variation: Number = 0.55, 0..=5;
         /// Variation of the dye balance between slides: standard deviation of the logarithm of each dye's amount.
         slide_balance: Number = 0.15, 0..=2;
         /// Variation of the dye balance between the fields of a slide, as `slide_balance`.
