@@ -604,6 +604,40 @@ mod tests {
     }
 
     #[test]
+    fn a_rod_falls_with_the_distance_from_its_segment_and_is_cut_at_the_tile() {
+        let blank = || Tile { origin: [0, 0], width: 30, values: vec![0.0; 30 * 20] };
+        for ends in [[[8.3, 6.1], [17.9, 11.4]], [[12.0, 9.0], [12.0, 9.0]], [[-2.0, 3.0], [4.0, 25.0]]] {
+            let mut tile = blank();
+            Rod { ends, sigma: 1.5, strength: 0.6 }.draw(&mut tile);
+            tile.for_each(|p, found| {
+                // The smallest distance to many points of the segment.
+                let square = |k: u16| {
+                    let t = f64::from(k) / 2000.0;
+                    let [dx, dy] = [0, 1].map(|axis| p[axis] - ends[0][axis] - t * (ends[1][axis] - ends[0][axis]));
+                    dx * dx + dy * dy
+                };
+                let nearest = (0..=2000).map(square).fold(f64::INFINITY, f64::min);
+                let expected = if nearest > 20.25 { 0.0 } else { 0.6 * libm::exp(-nearest / 4.5) };
+                // Beyond three standard deviations, a pixel may be in the box of the rod or not.
+                assert!((f64::from(*found) - expected).abs() < 0.007, "{p:?}: {found} {expected}");
+            });
+        }
+        let mut outside = blank();
+        Rod { ends: [[50.0, 5.0], [60.0, -40.0]], sigma: 1.5, strength: 0.6 }.draw(&mut outside);
+        assert_eq!(outside, blank());
+    }
+
+    #[test]
+    fn the_number_of_specks_is_that_per_area() {
+        let tile = Tile { origin: [0, 0], width: 50, values: vec![0.0; 50 * 40] };
+        let rng = &mut Key { seed: 1, index: 0 }.stream("test", 0, "specks");
+        // A tile of 125 µm².
+        let total: usize = (0..4000).map(|_| count_in_box(&tile, 2.1, 0.25, rng)).sum();
+        assert!((total as f64 / 4000.0 - 2.625).abs() < 0.05, "{total}");
+        assert_eq!(count_in_box(&tile, 0.0, 0.25, rng), 0);
+    }
+
+    #[test]
     fn a_gradient_keeps_the_thickness_at_the_centre() {
         let mut tile = Tile { origin: [-30, 10], width: 61, values: vec![2.0; 61 * 41] };
         apply_gradient(&mut tile, [0.0, 30.0], 25.0, [0.5, -0.25]);
