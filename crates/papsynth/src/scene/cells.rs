@@ -300,7 +300,7 @@ fn drawn_kind<'a>(texture: &'a CytoplasmTexture, of_field: f64, rng: &mut Stream
     found.unwrap_or(&texture.kinds[0])
 }
 
-/// Absorbance of a cell whose texture has the strength of the model.
+/// Absorbance of a cell whose texture has the strength of the model: the median of intermediate cells.
 const TEXTURE_ABSORBANCE: f64 = 0.125;
 
 /// Fraction of the variation of the standard deviation of chromatin that is independent of the absorbance.

@@ -6,6 +6,7 @@ use cloth_verlet::{Crease, FoldKind, PixelGrid, Sheet, SheetSpec, crease_outline
 mod detail;
 mod fine_texture;
 mod outline;
+mod specks;
 mod wrinkles;
 
 use wrinkles::Wrinkles;
@@ -187,8 +188,8 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
     let lines = &mut canvas[..coverage.values.len()];
     detail::add_cytoskeleton(&mut absorbance, &plan.outline, cell, lines, &mut rng)?;
     detail::add_degeneration(&mut absorbance, &coverage, cell);
-    detail::add_specks(&mut absorbance, cell);
-    detail::add_granules(&mut absorbance, body.detail.granules, pixel_um, &mut rng);
+    specks::add_specks(&mut absorbance, cell);
+    specks::add_granules(&mut absorbance, body.detail.granules, pixel_um, &mut rng);
     // Eq. 12: A = κ·c·l.
     let strength = body.cytoplasm_absorbance.max(MIN_ABSORBANCE) as f32;
     absorbance.values.iter_mut().zip(&coverage.values).for_each(|(value, cover)| *value *= cover * strength);

@@ -30,7 +30,8 @@ const THICKNESS: [f64; 2] = [0.4, 1.6];
 /// Fraction of the remaining wrinkles that fork off a previous one.
 const FORKED: f64 = 0.35;
 
-/// Fraction of the other wrinkles that are pleats: flat, with sharp sides, instead of ridges.
+/// Fraction of the other wrinkles that are pleats: flat, with sharp sides, instead of ridges. This and the next two
+/// numbers were set by eye, beside cells of real fields.
 const PLEATS: f64 = 0.4;
 /// Width of a pleat relative to that of a ridge: minimum, maximum.
 const PLEAT_WIDTH: [f64; 2] = [0.8, 1.8];
