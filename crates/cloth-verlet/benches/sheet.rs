@@ -36,7 +36,7 @@ fn crumple(c: &mut Criterion) {
 fn thickness(c: &mut Criterion) {
     let cloth = Cloth::new(&ClothParams::default()).expect("presets are valid");
     let flat = cloth.crumple(&outline(3.0), &mut Xoshiro256PlusPlus::seed_from_u64(1)).expect("an outline");
-    let crease = Crease { point: [30.0, 10.0], direction_rad: 1.0, curvature: 0.0, radius: 4.0, kind: FoldKind::Flap };
+    let crease = Crease::straight([30.0, 10.0], 1.0, 4.0, FoldKind::Flap);
     let mut folded = flat.clone();
     folded.fold(&crease).expect("a crease");
     let grid = PixelGrid { origin: [-110.0, -110.0], pixel_size: 1.0 };

@@ -125,17 +125,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     figure.thickness(3, &sheet);
 
     figure.thickness(4, &paper);
-    let flap = Crease { point: [42.0, -20.0], direction_rad: -1.0, curvature: 0.0, radius: 3.0, kind: FoldKind::Flap };
-    let roll = Crease {
-        point: [0.0, 70.0],
-        direction_rad: 0.15,
-        curvature: 0.0,
-        radius: 2.5,
-        kind: FoldKind::Roll { turns: 2 },
-    };
+    let flap = Crease::straight([42.0, -20.0], -1.0, 3.0, FoldKind::Flap);
+    let roll = Crease::straight([0.0, 70.0], 0.15, 2.5, FoldKind::Roll { turns: 2 });
     let sides = [
-        Crease { point: [35.0, 0.0], direction_rad: -1.4, curvature: 0.0, radius: 7.0, kind: FoldKind::Flap },
-        Crease { point: [-30.0, 0.0], direction_rad: 1.8, curvature: 0.0, radius: 6.0, kind: FoldKind::Flap },
+        Crease::straight([35.0, 0.0], -1.4, 7.0, FoldKind::Flap),
+        Crease::straight([-30.0, 0.0], 1.8, 6.0, FoldKind::Flap),
     ];
     for (panel, creases) in [(5, &[flap][..]), (6, &[roll]), (7, &sides)] {
         let mut folded = sheet.clone();

@@ -17,7 +17,7 @@ const MOST_TURNS: u32 = 100;
 /// Largest number of parts of a side that follows a curved line.
 const MOST_PARTS: f64 = 1000.0;
 
-/// A fold along a line or a parabola. The part of the sheet beyond it is bent up around a tube on it.
+/// A fold along a line, a parabola or a wavy line. The part of the sheet beyond it is bent up around a tube on it.
 ///
 /// A straight fold does not stretch the sheet. A curved one is a straight one of a sheared sheet: it preserves areas,
 /// and stretches by about the distance from the vertex times the curvature.
@@ -31,10 +31,23 @@ pub struct Crease {
     /// Curvature at `point`, which is the vertex of a parabola, in 1 over the unit of the sheet: 0 is a straight line,
     /// a positive one bends towards the side beyond.
     pub curvature: f64,
+    /// Waves of the line, added to the parabola.
+    pub waves: [Wave; 2],
     /// Radius of the tube in the unit of the sheet, above 0.
     pub radius: f64,
     /// Flap or roll.
     pub kind: FoldKind,
+}
+
+/// A wave of the line of a [`Crease`]: a·sin(kt + φ) at the distance t from its point along its direction.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Wave {
+    /// Amplitude a in the unit of the sheet.
+    pub amplitude: f64,
+    /// Wave number k: 2π over the wavelength, in radians per unit of the sheet.
+    pub wave_number: f64,
+    /// Phase φ, radians.
+    pub phase_rad: f64,
 }
 
 /// The kind of fold of a [`Crease`].
@@ -50,12 +63,23 @@ pub enum FoldKind {
 }
 
 impl Crease {
+    /// Returns a crease along a straight line. The fields have the same names.
+    #[must_use]
+    pub fn straight(point: Point, direction_rad: f64, radius: f64, kind: FoldKind) -> Self {
+        Self { point, direction_rad, curvature: 0.0, waves: Default::default(), radius, kind }
+    }
+
     fn check(&self) -> Result<(), Error> {
         let finite = (-f64::MAX, f64::MAX);
         range("point[0]", self.point[0], finite, "finite")?;
         range("point[1]", self.point[1], finite, "finite")?;
         range("direction_rad", self.direction_rad, finite, "finite")?;
         range("curvature", self.curvature, finite, "finite")?;
+        for wave in &self.waves {
+            range("waves.amplitude", wave.amplitude, finite, "finite")?;
+            range("waves.wave_number", wave.wave_number, finite, "finite")?;
+            range("waves.phase_rad", wave.phase_rad, finite, "finite")?;
+        }
         range("radius", self.radius, (f64::MIN_POSITIVE, f64::MAX), "above 0 and finite")?;
         match self.kind {
             FoldKind::Flap => Ok(()),
@@ -64,7 +88,7 @@ impl Crease {
     }
 
     /// Returns how far a point lies beyond the line in the unit of the sheet; negative before the line. Distances from
-    /// a curved line are measured parallel to the axis of the parabola.
+    /// a curved line are measured perpendicular to `direction_rad`.
     #[must_use]
     pub fn distance_beyond(&self, point: Point) -> f64 {
         self.sheared(point)[1]
@@ -75,16 +99,28 @@ impl Crease {
         [-libm::sin(self.direction_rad), libm::cos(self.direction_rad)]
     }
 
-    /// Returns the coordinates of a point along and beyond the line: s = n − κt²/2.
+    /// Returns the position of the line at `t` along its direction, f(t) = κt²/2 + Σ a·sin(kt + φ).
+    fn line_at(&self, t: f64) -> f64 {
+        let wave = |wave: &Wave| wave.amplitude * libm::sin(wave.wave_number * t + wave.phase_rad);
+        0.5 * self.curvature * t * t + self.waves.iter().filter(|wave| wave.amplitude != 0.0).map(wave).sum::<f64>()
+    }
+
+    /// Returns an upper bound of the curvature of the line.
+    fn most_curved(&self) -> f64 {
+        let wave = |wave: &Wave| (wave.amplitude * wave.wave_number * wave.wave_number).abs();
+        self.curvature.abs() + self.waves.iter().map(wave).sum::<f64>()
+    }
+
+    /// Returns the coordinates of a point along and beyond the line: s = n − f(t).
     fn sheared(&self, [x, y]: Point) -> Point {
         let (normal, [x, y]) = (self.normal(), [x - self.point[0], y - self.point[1]]);
         let t = x * normal[1] - y * normal[0];
-        [t, x * normal[0] + y * normal[1] - 0.5 * self.curvature * t * t]
+        [t, x * normal[0] + y * normal[1] - self.line_at(t)]
     }
 
     /// Returns the point with these coordinates along and beyond the line.
     fn point_at(&self, [t, s]: Point) -> Point {
-        let (normal, n) = (self.normal(), s + 0.5 * self.curvature * t * t);
+        let (normal, n) = (self.normal(), s + self.line_at(t));
         [self.point[0] + t * normal[1] + n * normal[0], self.point[1] - t * normal[0] + n * normal[1]]
     }
 
@@ -236,8 +272,8 @@ fn between<'a>(first: &'a [u32], second: &'a [u32], far: &'a [f64]) -> impl Iter
 pub fn crease_outline(outline: &[Point], crease: &Crease) -> Result<Vec<Vec<Point>>, Error> {
     crease.check()?;
     crate::outline::Outline::new(outline)?;
-    // Sides longer than this differ from the parabola by more than a hundredth of the radius.
-    let longest = (0.08 * crease.radius / crease.curvature.abs()).sqrt();
+    // Sides longer than this differ from the line by more than a hundredth of the radius.
+    let longest = (0.08 * crease.radius / crease.most_curved()).sqrt();
     let polygon: Vec<Point> = finely(outline, longest).into_iter().map(|p| crease.sheared(p)).collect();
     let end = polygon.iter().fold(0.0_f64, |m, p| m.max(p[1]));
     let lines: Vec<f64> = crease.strips(end).collect();
@@ -350,8 +386,19 @@ mod tests {
     use crate::testing::{angular, rng, wavy};
     use crate::{Cloth, ClothParams, PixelGrid};
 
-    const CREASE: Crease =
-        Crease { point: [40.0, -10.0], direction_rad: 2.0, curvature: 0.0, radius: 3.0, kind: FoldKind::Flap };
+    const STRAIGHT: Wave = Wave { amplitude: 0.0, wave_number: 0.0, phase_rad: 0.0 };
+    const WAVES: [Wave; 2] = [
+        Wave { amplitude: 1.5, wave_number: 0.2, phase_rad: 0.4 },
+        Wave { amplitude: -0.5, wave_number: 0.47, phase_rad: -2.0 },
+    ];
+    const CREASE: Crease = Crease {
+        point: [40.0, -10.0],
+        direction_rad: 2.0,
+        curvature: 0.0,
+        waves: [STRAIGHT; 2],
+        radius: 3.0,
+        kind: FoldKind::Flap,
+    };
 
     fn flat() -> Sheet {
         let mut sheet = Cloth::new(&ClothParams::default()).unwrap().crumple(&wavy(2.0, 0.1), &mut rng(5)).unwrap();
@@ -403,8 +450,8 @@ mod tests {
     }
 
     #[test]
-    fn distances_beyond_a_line_are_parallel_to_the_axis_of_the_parabola() {
-        let curved = Crease { curvature: 0.02, ..CREASE };
+    fn distances_beyond_a_curved_line_are_perpendicular_to_its_direction() {
+        let curved = Crease { curvature: 0.02, waves: WAVES, ..CREASE };
         for [t, s] in [[0.0, 0.0], [3.0, -2.0], [-8.0, 5.0]] {
             assert!((curved.distance_beyond(curved.point_at([t, s])) - s).abs() < 1e-12);
         }
@@ -430,15 +477,20 @@ mod tests {
     }
 
     #[test]
-    fn a_curved_flap_lies_on_its_parabola_and_keeps_its_area() {
-        let crease = Crease { curvature: 0.01, radius: 1e-3, ..CREASE };
+    fn a_curved_flap_lies_on_its_line_and_keeps_its_area() {
+        for waves in [CREASE.waves, WAVES] {
+            lies_on_its_line(&Crease { curvature: 0.01, waves, radius: 1e-3, ..CREASE });
+        }
+    }
+
+    fn lies_on_its_line(crease: &Crease) {
         let outline: Vec<Point> = finely(&wavy(2.0, 0.1), 0.5).iter().map(|p| [30.0 + p[0], p[1] - 20.0]).collect();
-        let pieces = crease_outline(&outline, &crease).unwrap();
+        let pieces = crease_outline(&outline, crease).unwrap();
         let area: f64 = pieces.iter().map(|p| moments(p).0).sum();
-        assert!((area / moments(&outline).0 - 1.0).abs() < 1e-3);
+        assert!((area / moments(&outline).0 - 1.0).abs() < 1e-3, "{area}");
         let points = || pieces.iter().flatten().map(|p| crease.sheared(*p));
         assert!(points().all(|[_, s]| s < 1.1e-3));
-        // Both ends of the fold and its middle are on the parabola.
+        // Both ends of the fold and its middle are on the line.
         let on_line: Vec<f64> = points().filter(|[_, s]| s.abs() < 2e-3).map(|[t, _]| t).collect();
         assert!(on_line.len() > 20 && on_line.iter().any(|t| *t < -10.0) && on_line.iter().any(|t| *t > 10.0));
         for p in [[3.0, -4.0], [55.0, 1.0]] {
@@ -457,13 +509,14 @@ mod tests {
 
     #[test]
     fn the_silhouette_is_that_of_the_folded_sheet() {
-        for (direction_rad, curvature, kind) in [
-            (2.0, 0.0, FoldKind::Flap),
-            (0.3, 0.0, FoldKind::Roll { turns: 1 }),
-            (2.0, 0.008, FoldKind::Flap),
-            (0.3, -0.008, FoldKind::Roll { turns: 1 }),
+        for (direction_rad, curvature, waves, kind) in [
+            (2.0, 0.0, CREASE.waves, FoldKind::Flap),
+            (0.3, 0.0, CREASE.waves, FoldKind::Roll { turns: 1 }),
+            (2.0, 0.008, CREASE.waves, FoldKind::Flap),
+            (0.3, -0.008, CREASE.waves, FoldKind::Roll { turns: 1 }),
+            (2.0, 0.008, WAVES, FoldKind::Flap),
         ] {
-            let crease = Crease { direction_rad, curvature, kind, ..CREASE };
+            let crease = Crease { direction_rad, curvature, waves, kind, ..CREASE };
             let mut sheet = flat();
             let place = |&(v, _): &(u32, u32)| [sheet.vertices[v as usize][0], sheet.vertices[v as usize][1]];
             let rim: Vec<Point> = rim(&sheet.edges).iter().map(place).collect();
@@ -477,7 +530,7 @@ mod tests {
                 .map(|[a, b, c]| crate::sheet::cross(a, b, c).abs() / 2.0)
                 .sum();
             // Triangles of the sheet have straight sides.
-            let tolerance = if curvature == 0.0 { 1e-9 } else { 3e-3 };
+            let tolerance = if crease.most_curved() == 0.0 { 1e-9 } else { 3e-3 };
             assert!((areas / shadow - 1.0).abs() < tolerance, "{areas} {shadow}");
             // Pixels have a thickness exactly where a piece covers them.
             let mut image = vec![0.0_f32; 250 * 250];
@@ -520,6 +573,7 @@ mod tests {
             Crease { radius: f64::NAN, ..CREASE },
             Crease { direction_rad: f64::INFINITY, ..CREASE },
             Crease { curvature: f64::NAN, ..CREASE },
+            Crease { waves: [STRAIGHT, Wave { wave_number: f64::INFINITY, ..STRAIGHT }], ..CREASE },
             Crease { point: [0.0, f64::NAN], ..CREASE },
             Crease { kind: FoldKind::Roll { turns: 0 }, ..CREASE },
         ] {

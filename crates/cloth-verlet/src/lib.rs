@@ -22,7 +22,7 @@ mod sheet;
 mod testing;
 
 pub use cloth::{Cloth, SheetSpec};
-pub use crease::{Crease, FoldKind, crease_outline};
+pub use crease::{Crease, FoldKind, Wave, crease_outline};
 pub use error::Error;
 pub use params::{ClothParams, RestShape, Smoothing, Solver, VerletParams, XpbdParams};
 pub use rand_core::Rng;

@@ -123,10 +123,18 @@ impl Recipe {
     }
 
     /// Returns the index of the condition of a slide; `None` if the recipe has no conditions.
+    ///
+    /// Conditions are evenly spread: among any consecutive slides, each is about as frequent as its weight says. The
+    /// slides are points of an additive recurrence with the golden ratio, from a random point on (Kuipers and
+    /// Niederreiter, *Uniform Distribution of Sequences*, 1974, section 2.3).
     #[must_use]
     pub fn condition_of_slide(&self, seed: u64, slide: u64) -> Option<usize> {
+        /// (√5 − 1)/2, times 2⁶⁴.
+        const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
+        let first = random::uniform(&mut Key { seed, index: 0 }.stream("slides", 0, "conditions"));
+        let moved = (slide.wrapping_mul(GOLDEN) >> 11) as f64 / (1_u64 << 53) as f64;
         let sum: f64 = self.conditions.iter().map(|condition| condition.weight).sum();
-        let mut rest = sum * random::uniform(&mut Key { seed, index: slide }.stream("slide", 0, "conditions"));
+        let mut rest = sum * (first + moved).fract();
         let weights = self.conditions.iter().enumerate().filter(|(_, condition)| condition.weight > 0.0);
         let mut found = None;
         for (index, condition) in weights {
@@ -227,9 +235,13 @@ mod tests {
     #[test]
     fn conditions_are_as_frequent_as_their_weights() {
         let recipe = recipe();
-        let second = (0..4000).filter(|slide| recipe.condition_of_slide(1, *slide) == Some(1)).count();
-        // A binomial distribution: mean 1000, standard deviation 27.
-        assert!((890..1110).contains(&second), "{second}");
+        for seed in 0..20 {
+            for slides in [0..8, 5..45, 900..1300, u64::MAX - 401..u64::MAX - 1] {
+                let expected = (slides.end - slides.start) / 4;
+                let second = slides.filter(|slide| recipe.condition_of_slide(seed, *slide) == Some(1)).count() as u64;
+                assert!(second.abs_diff(expected) <= 2, "{second}, not {expected}");
+            }
+        }
         assert_eq!(Recipe::default().condition_of_slide(1, 0), None);
     }
 

@@ -78,6 +78,8 @@ pub struct Fold {
     pub depth: f64,
     /// Curvature of the crease times the radius of the cell; a positive one bends towards the rim.
     pub curvature: f64,
+    /// Amplitude of the waves of the crease, as a fraction of the radius of the cell.
+    pub waviness: f64,
     /// Bending radius, µm.
     pub radius_um: f64,
 }

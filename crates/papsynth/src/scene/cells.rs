@@ -364,6 +364,7 @@ fn draw_fold(recipe: &Recipe, pliability: f64, rng: &mut Stream) -> Option<Fold>
     let radius_um = folds.radius_um.draw(rng);
     let side = if random::chance(0.5, rng) { -1.0 } else { 1.0 };
     let curvature = side * folds.curvature.draw(rng);
+    let waviness = folds.waviness.draw(rng);
     let form = if which < folded_over {
         FoldForm::FoldedOver
     } else if which < folded_over + roll {
@@ -382,7 +383,7 @@ fn draw_fold(recipe: &Recipe, pliability: f64, rng: &mut Stream) -> Option<Fold>
         FoldForm::Roll => depth * ROLLED,
         FoldForm::FoldedOver => FOLDED_OVER,
     };
-    Some(Fold { form, direction_deg, depth, curvature, radius_um })
+    Some(Fold { form, direction_deg, depth, curvature, waviness, radius_um })
 }
 
 #[cfg(test)]

@@ -62,13 +62,8 @@ pub(super) fn draw(smudge: &Smudge, context: &ObjectContext<'_>, rng: &mut Strea
         let normal = [libm::cos(direction), libm::sin(direction)];
         let reach = layers.iter().flatten().map(|p| p[0] * normal[0] + p[1] * normal[1]).fold(0.0, f64::max);
         let at = reach * random::between(CREASE[0], CREASE[1], rng);
-        let crease = Crease {
-            point: [at * normal[0], at * normal[1]],
-            direction_rad: direction - core::f64::consts::FRAC_PI_2,
-            curvature: 0.0,
-            radius: CREASE_UM,
-            kind: FoldKind::Flap,
-        };
+        let point = [at * normal[0], at * normal[1]];
+        let crease = Crease::straight(point, direction - core::f64::consts::FRAC_PI_2, CREASE_UM, FoldKind::Flap);
         // A layer that cannot be folded stays flat.
         layers = layers.iter().flat_map(|p| crease_outline(p, &crease).unwrap_or_else(|_| vec![p.clone()])).collect();
     }

@@ -1,7 +1,7 @@
 //! Epithelial cells: outline, sheet, folds, and the three levels of detail (paper, section "Squamous Intermediate Cell
 //! Phantoms").
 
-use cloth_verlet::{Crease, FoldKind, PixelGrid, Sheet, SheetSpec, crease_outline};
+use cloth_verlet::{Crease, FoldKind, PixelGrid, Sheet, SheetSpec, Wave, crease_outline};
 
 mod detail;
 mod fine_texture;
@@ -20,6 +20,7 @@ use crate::phantom::nucleus;
 use crate::phantom::piece::{MIN_ABSORBANCE, Phantom, Piece};
 use crate::phantom::tile::{Point, Tile, area};
 use crate::profile::Stage;
+use crate::random;
 use crate::scene::cell::{CellBody, Fold, FoldForm, NucleusBody, stretched};
 use crate::truth::part::Part;
 use crate::truth::traits::Trait;
@@ -29,6 +30,9 @@ const POINTS: usize = 180;
 
 /// Largest angle between the two creases of a cell folded from both sides, radians.
 const SKEW: f64 = 0.45;
+
+/// Waves of a crease: relative amplitude, and wavelength in radii of the cell, minimum and maximum.
+const WAVES: [[f64; 3]; 2] = [[1.0, 0.8, 1.8], [0.35, 0.3, 0.6]];
 
 /// Distance between the points of a roughened rim, µm.
 const RIM_STEP_UM: f64 = 0.375;
@@ -81,7 +85,8 @@ fn creases(cell: &CellContext<'_>, fold: Fold, outline: &[Point], centre: Point)
     let (body, pixel_um) = (cell.body, cell.pixel_um());
     let off_centre = body.nucleus.off_centre.map(|fraction| fraction * body.radius_um / pixel_um);
     let nucleus_radius = body.nucleus.radius_um / pixel_um;
-    let crease = |direction: f64| {
+    let mut rng = cell.stream("creases");
+    let mut crease = |direction: f64| {
         let normal = [libm::cos(direction), libm::sin(direction)];
         let reach =
             outline.iter().map(|p| (p[0] - centre[0]) * normal[0] + (p[1] - centre[1]) * normal[1]).fold(0.0, f64::max);
@@ -97,6 +102,11 @@ fn creases(cell: &CellContext<'_>, fold: Fold, outline: &[Point], centre: Point)
             // The crease is perpendicular to the direction of the fold.
             direction_rad: direction - core::f64::consts::FRAC_PI_2,
             curvature: fold.curvature / radius,
+            waves: WAVES.map(|[amplitude, shortest, longest]| Wave {
+                amplitude: amplitude * fold.waviness * radius,
+                wave_number: core::f64::consts::TAU / (random::between(shortest, longest, &mut rng) * radius),
+                phase_rad: random::between(0.0, core::f64::consts::TAU, &mut rng),
+            }),
             radius: fold.radius_um / pixel_um,
             kind,
         }
@@ -113,6 +123,15 @@ fn creases(cell: &CellContext<'_>, fold: Fold, outline: &[Point], centre: Point)
         }
         FoldForm::Flap | FoldForm::Roll => vec![crease(direction)],
     }
+}
+
+/// Returns the longest part of the outline of a folded cell that lies on the crease of a flap.
+fn edge_of_flap(pieces: &[Vec<Point>], crease: &Crease) -> Option<Vec<Point>> {
+    if crease.kind != FoldKind::Flap {
+        return None;
+    }
+    let parts = pieces.iter().flat_map(|piece| piece.split(|p| crease.distance_beyond(*p) <= 0.0));
+    parts.max_by_key(|part| part.len()).filter(|part| part.len() > 1).map(<[Point]>::to_vec)
 }
 
 fn crumple(
@@ -140,7 +159,8 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
         let folded = pieces.iter().map(|piece| crease_outline(piece, crease)).collect::<Result<Vec<_>, _>>();
         pieces = folded?.concat();
     }
-    let wrinkles = Wrinkles::new(&plan.outline, cell);
+    let edges: Vec<Vec<Point>> = plan.creases.iter().filter_map(|crease| edge_of_flap(&pieces, crease)).collect();
+    let wrinkles = Wrinkles::new(&plan.outline, &edges, cell);
     let rough: Vec<Vec<Point>> = pieces
         .iter()
         .map(|p| {

@@ -23,15 +23,15 @@ pub(super) fn add_granules(absorbance: &mut Tile, per_100_um2: f64, pixel_um: f6
 }
 
 /// Fraction of specks that lie near the previous one, and the standard deviation of their distance in x and y, µm.
-const GROUPED: f64 = 0.5;
-const GROUP_UM: f64 = 2.5;
+const GROUPED: f64 = 0.75;
+const GROUP_UM: f64 = 3.0;
 
 /// Fraction of specks that are rods, and their length, µm: minimum, maximum.
 const RODS: f64 = 0.6;
 const ROD_UM: [f64; 2] = [0.5, 2.5];
 
 /// Mean absorbance of a speck relative to the cytoplasm, and the maximum.
-const SPECK: [f64; 2] = [0.4, 1.6];
+const SPECK: [f64; 2] = [0.32, 1.3];
 
 /// Adds specks: dark dots and short rods, in groups. The rods of a cell have similar directions.
 pub(super) fn add_specks(absorbance: &mut Tile, cell: &CellContext<'_>) {

@@ -17,24 +17,29 @@ const STEP_UM: f64 = 0.5;
 /// along rims are about as dark and as frequent as in real fields (docs/decisions.md, "Rolled rims").
 const ROLLED: f64 = 0.2;
 /// Thickness of a rolled stretch relative to that of a wrinkle: minimum, maximum.
-const ROLLED_THICKNESS: [f64; 2] = [0.8, 3.0];
+const ROLLED_THICKNESS: [f64; 2] = [0.5, 2.0];
 /// Width of a rolled stretch (standard deviation of its profile), µm: minimum, maximum.
 const ROLLED_UM: [f64; 2] = [0.4, 0.9];
 /// Distance of a rolled stretch from the rim, in radii of the cell: minimum, maximum.
 const ROLLED_INSET: [f64; 2] = [0.01, 0.04];
 
+/// Thickness of the ridge along the edge of a flap relative to that of a wrinkle, and its width, µm: minimum, maximum.
+const EDGE_THICKNESS: [f64; 2] = [0.4, 2.0];
+const EDGE_UM: [f64; 2] = [0.35, 0.8];
+
 /// Fraction of the other wrinkles that follow the rim.
 const ALONG_RIM: f64 = 0.4;
-/// Thickness of another wrinkle relative to the mean: minimum, maximum.
+/// Thickness and width of another wrinkle relative to the mean: minimum, maximum.
 const THICKNESS: [f64; 2] = [0.4, 1.6];
+const WIDTH: [f64; 2] = [0.6, 1.6];
 /// Fraction of the remaining wrinkles that fork off a previous one.
 const FORKED: f64 = 0.35;
 
-/// Fraction of the other wrinkles that are pleats: flat, with sharp sides, instead of ridges. This and the next two
+/// Fraction of the other wrinkles that are pleats: two dark lines with a paler band between, instead of ridges. This and the next two
 /// numbers were set by eye, beside cells of real fields.
-const PLEATS: f64 = 0.4;
+const PLEATS: f64 = 0.5;
 /// Width of a pleat relative to that of a ridge: minimum, maximum.
-const PLEAT_WIDTH: [f64; 2] = [0.8, 1.8];
+const PLEAT_WIDTH: [f64; 2] = [0.8, 2.5];
 /// Width of a wrinkle at its ends relative to its middle.
 const END_WIDTH: f64 = 0.4;
 
@@ -60,8 +65,8 @@ pub(super) struct Wrinkles {
 }
 
 impl Wrinkles {
-    /// Draws the wrinkles of a cell with this outline.
-    pub(super) fn new(outline: &[Point], cell: &CellContext<'_>) -> Self {
+    /// Draws the wrinkles of a cell with this outline. `edges` are the edges of its flaps.
+    pub(super) fn new(outline: &[Point], edges: &[Vec<Point>], cell: &CellContext<'_>) -> Self {
         let (detail, pixel_um, rng) = (&cell.body.detail, cell.pixel_um(), &mut cell.stream("wrinkles"));
         let mut wrinkles = Self { rolled: Vec::new(), others: Vec::new() };
         if detail.wrinkles == 0 {
@@ -69,6 +74,12 @@ impl Wrinkles {
         }
         let step = STEP_UM / pixel_um;
         let rim = fsd_shape::resample_along(outline, random::count(fsd_shape::perimeter(outline) / step).max(8));
+        for edge in edges {
+            let path = at_steps(edge, step);
+            let sizes = WrinkleSizes { width_um: EDGE_UM, thickness: EDGE_THICKNESS, pleat: false };
+            let profile = WrinkleProfile::new(path.len(), &sizes, cell, rng);
+            wrinkles.others.push(Wrinkle { path, profile });
+        }
         for _ in 0..detail.wrinkles {
             let rolled = random::chance(ROLLED, rng);
             let others = &wrinkles.others;
@@ -88,20 +99,14 @@ impl Wrinkles {
                 _ => across(outline, step, rng),
             };
             let pleat = !rolled && random::chance(PLEATS, rng);
-            let (width_um, thickness_range) = match rolled {
-                true => (random::between(ROLLED_UM[0], ROLLED_UM[1], rng), ROLLED_THICKNESS),
-                false => (detail.wrinkle_um * random::between(0.6, 1.6, rng), THICKNESS),
+            let sizes = match rolled {
+                true => WrinkleSizes { width_um: ROLLED_UM, thickness: ROLLED_THICKNESS, pleat },
+                false => {
+                    let width_um = WIDTH.map(|width| width * detail.wrinkle_um);
+                    WrinkleSizes { width_um, thickness: THICKNESS, pleat }
+                }
             };
-            let factor = if pleat { random::between(PLEAT_WIDTH[0], PLEAT_WIDTH[1], rng) } else { 1.0 };
-            let profile = WrinkleProfile {
-                width: factor * width_um / pixel_um,
-                pleat,
-                strength: detail.wrinkle_thickness * random::between(thickness_range[0], thickness_range[1], rng),
-                side: if random::chance(0.5, rng) { 1.0 } else { -1.0 },
-                rise: random::between(0.05, TAPER, rng),
-                fall: random::between(0.1, 2.0 * TAPER, rng),
-                factors: random_factors(path.len(), rng),
-            };
+            let profile = WrinkleProfile::new(path.len(), &sizes, cell, rng);
             let same = if rolled { &mut wrinkles.rolled } else { &mut wrinkles.others };
             same.push(Wrinkle { path, profile });
         }
@@ -129,6 +134,23 @@ impl Wrinkles {
         let distance = points.map(square).fold(far * far, f64::min).sqrt();
         SMOOTH + (1.0 - SMOOTH) * ((distance - near) / (far - near)).max(0.0)
     }
+}
+
+/// Returns points at equal steps along a path.
+fn at_steps(path: &[Point], step: f64) -> Vec<Point> {
+    let mut points: Vec<Point> = path.first().copied().into_iter().collect();
+    let mut next = step;
+    for ends in path.windows(2) {
+        let [dx, dy] = [0, 1].map(|axis| ends[1][axis] - ends[0][axis]);
+        let length = (dx * dx + dy * dy).sqrt();
+        while next <= length {
+            let t = next / length;
+            points.push([ends[0][0] + t * dx, ends[0][1] + t * dy]);
+            next += step;
+        }
+        next -= length;
+    }
+    points
 }
 
 /// Draws random factors with a mean of about 1 and a correlation length of a few micrometres; some are 0.
@@ -217,7 +239,7 @@ const EXTENT: [f64; 2] = [3.0, 2.2 * SLOPE_WIDTH];
 struct WrinkleProfile {
     /// Standard deviation of the crest in the middle of the wrinkle, px.
     width: f64,
-    /// Whether the crest is flat.
+    /// Whether the wrinkle is a pleat.
     pleat: bool,
     /// Thickness added at the crest, relative to a flat sheet.
     strength: f64,
@@ -231,7 +253,33 @@ struct WrinkleProfile {
     factors: Vec<f64>,
 }
 
+/// The sizes of a kind of wrinkle.
+struct WrinkleSizes {
+    /// Minimum and maximum of the width of the crest, µm.
+    width_um: [f64; 2],
+    /// Minimum and maximum of the thickness relative to the wrinkles of the cell.
+    thickness: [f64; 2],
+    /// Whether the wrinkle is a pleat.
+    pleat: bool,
+}
+
 impl WrinkleProfile {
+    /// Draws the profile of a wrinkle with this number of points.
+    fn new(points: usize, sizes: &WrinkleSizes, cell: &CellContext<'_>, rng: &mut Stream) -> Self {
+        let factor = if sizes.pleat { random::between(PLEAT_WIDTH[0], PLEAT_WIDTH[1], rng) } else { 1.0 };
+        let [width_um, thickness] =
+            [sizes.width_um, sizes.thickness].map(|range| random::between(range[0], range[1], rng));
+        Self {
+            width: factor * width_um / cell.pixel_um(),
+            pleat: sizes.pleat,
+            strength: cell.body.detail.wrinkle_thickness * thickness,
+            side: if random::chance(0.5, rng) { 1.0 } else { -1.0 },
+            rise: random::between(0.05, TAPER, rng),
+            fall: random::between(0.1, 2.0 * TAPER, rng),
+            factors: random_factors(points, rng),
+        }
+    }
+
     /// Adds the wrinkle where the cell covers. `canvas` is zero before and after, with a margin of [`LANES`] values.
     fn draw(&self, path: &[Point], thickness: &mut Tile, coverage: &Tile, canvas: &mut [f32]) {
         let (width, height) = (thickness.width, thickness.height());
@@ -267,7 +315,7 @@ impl WrinkleProfile {
             range: [[-width, length + width], [-EXTENT[0] * width, EXTENT[1] * width]],
             strength: strength as f32,
             per_width: 1.0 / width,
-            exponents: if self.pleat { PLEAT_EXPONENTS } else { RIDGE_EXPONENTS },
+            crest: if self.pleat { PLEAT } else { RIDGE },
         }
     }
 }
@@ -284,16 +332,21 @@ struct Segment {
     strength: f32,
     /// 1/σ of the crest, px⁻¹.
     per_width: f64,
-    /// Coefficients of the square and of the fourth power of the distance from the crest, relative to its width, in the
-    /// exponent of its profile.
+    crest: Crest,
+}
+
+/// The profile of a crest: (f₀ + f₁x²)·exp(e₀x² + e₁x⁴) at the distance x from its middle, relative to its width.
+#[derive(Clone, Copy)]
+struct Crest {
+    factors: [f32; 2],
     exponents: [f32; 2],
 }
 
 /// A normal distribution.
-const RIDGE_EXPONENTS: [f32; 2] = [-0.5, 0.0];
+const RIDGE: Crest = Crest { factors: [1.0, 0.0], exponents: [-0.5, 0.0] };
 
-/// Flat, with sharp sides.
-const PLEAT_EXPONENTS: [f32; 2] = [0.0, -0.3];
+/// Sharp sides that are higher than the middle.
+const PLEAT: Crest = Crest { factors: [0.55, 0.9], exponents: [0.0, -0.3] };
 
 impl Segment {
     /// Returns the rows of the image that it intersects.
@@ -339,7 +392,7 @@ pub(super) const LANES: usize = 16;
 fn paint(segment: &Segment, canvas: &mut [f32], width: usize, touched: &mut [Range<usize>]) {
     /// Rate at which the slope falls, per standard deviation of the crest.
     const RATE: f32 = (-1.0 / SLOPE_WIDTH) as f32;
-    let Segment { from, off, per_width, strength, exponents, .. } = *segment;
+    let Segment { from, off, per_width, strength, crest: Crest { factors, exponents }, .. } = *segment;
     let step = (off[0] * per_width) as f32;
     // The slope falls by these factors from a pixel to the next ones. Loops, since closures are compiled separately.
     let mut falls = [0.0; LANES];
@@ -372,8 +425,9 @@ fn paint(segment: &Segment, canvas: &mut [f32], width: usize, touched: &mut [Ran
                 for i in 0..LANES {
                     let off = first + step * i as f32;
                     let square = off * off;
-                    let crest = exp_f32(square * (exponents[0] + exponents[1] * square));
-                    let above = slope * falls[i] - SLOPE as f32 * crest;
+                    let fall = exp_f32(square * (exponents[0] + exponents[1] * square));
+                    let above = slope * falls[i] - SLOPE as f32 * fall;
+                    let crest = fall * (factors[0] + factors[1] * square);
                     let profile = strength * (crest + if off > 0.0 { above } else { 0.0 });
                     let profile = if (i as f32) < left { profile } else { 0.0 };
                     canvas[i] = if profile > canvas[i] { profile } else { canvas[i] };
@@ -428,8 +482,9 @@ mod tests {
                 let off = side * (p[1] * along[0] - p[0] * along[1]);
                 let inside = (-2.3..=9.3).contains(&on) && (-6.9..=20.24).contains(&off);
                 let square = off * off / (2.3 * 2.3);
-                let crest = libm::exp(if pleat { -0.3 * square * square } else { -0.5 * square });
-                let slope = if off > 0.0 { SLOPE * (libm::exp(-off / (SLOPE_WIDTH * 2.3)) - crest) } else { 0.0 };
+                let fall = libm::exp(if pleat { -0.3 * square * square } else { -0.5 * square });
+                let slope = if off > 0.0 { SLOPE * (libm::exp(-off / (SLOPE_WIDTH * 2.3)) - fall) } else { 0.0 };
+                let crest = fall * if pleat { 0.55 + 0.9 * square } else { 1.0 };
                 let expected = if inside { 0.8 * (crest + slope) } else { 0.0 };
                 assert!((f64::from(*value) - expected).abs() < 1e-5, "{direction}: {p:?} {value} {expected}");
                 painted += usize::from(inside);
