@@ -95,9 +95,9 @@ pub(crate) fn correlate(
             let step = ((top - expected[at]).max(0.0) * per_level) as usize;
             let value = remaining[step.min(STEPS)]
                 * (uncorrelated * own[at] + correlated * (shared[at] + skew * diagonals))
-                * (1.0 + GAIN * bright * sharp).sqrt()
+                * (1.0 + GAIN * sharp).sqrt()
                 / norm
-                + LINES * bright * structured * lines[at];
+                + LINES * structured * lines[at];
             *grey = (expected[at] + value + 0.5).clamp(0.0, top) as u16;
         }
     }
@@ -179,7 +179,7 @@ const HALF_UNCORRELATED: f64 = 80.0;
 
 /// Grey levels, relative to the highest one, between which the noise of dark areas changes from uncorrelated, without
 /// lines, to that of bright ones: fitted to the noise in nuclei and piles of cells of 24 real EDF images.
-const DARK: [f32; 2] = [0.08, 0.45];
+const DARK: [f32; 2] = [-0.1, 0.6];
 
 /// Increase of the variance of noise where a plane is sharper than others, relative to the empty slide, where several
 /// planes are averaged: fitted to the noise on the cytoplasm of real EDF images.
