@@ -249,7 +249,7 @@ section! {
         /// the cell class.
         flap: Number = 0.15, 0..=1;
         /// Probability of a rolled rim, before multiplication with the pliability of the cell class.
-        roll: Number = 0.18, 0..=1;
+        roll: Number = 0.12, 0..=1;
         /// Probability that both sides of the cell are folded over, before multiplication with the pliability of the
         /// cell class.
         folded_over: Number = 0.02, 0..=1;
@@ -260,7 +260,7 @@ section! {
         /// Amplitude of the waves of a crease, as a fraction of the radius of the cell.
         waviness: Number = Number::uniform(0.01, 0.06), 0..=0.5;
         /// Bending radius of a fold.
-        radius_um: Number = Number::uniform(0.35, 0.8), 0.1..=5, "µm";
+        radius_um: Number = Number::uniform(0.4, 1.2), 0.1..=5, "µm";
     }
 }
 
@@ -285,9 +285,9 @@ section! {
         /// Number of protrusions of the rim.
         protrusions: Number (given usize) = Number::log_normal(1.5, 0.9).at_most(9.0), 0..=20;
         /// Number of wrinkles: ridges and pleats. A fifth of them are rolled stretches of the rim.
-        wrinkles: Number (given usize) = Number::log_normal(9.0, 0.6).at_most(60.0), 0..=100;
+        wrinkles: Number (given usize) = Number::log_normal(10.0, 0.6).at_most(60.0), 0..=100;
         /// Additional thickness at the crest of a wrinkle, relative to the flat sheet. Rolled stretches of the rim have
-        /// 0.5 to 2 times this thickness.
+        /// 0.4 to 1.6 times this thickness.
         wrinkle_thickness: Number (given f64) = Number::log_normal(0.2, 0.42), 0..=5;
         /// Width of a wrinkle: standard deviation of its profile. Rolled stretches of the rim have 0.4 to 0.9 µm.
         wrinkle_um: Number (given f64) = Number::uniform(0.3, 1.3), 0.05..=5, "µm";
@@ -295,7 +295,7 @@ section! {
         endoplasm: Number (given f64) = Number::log_normal(0.13, 0.5), 0..=2;
         /// Amplitude of the first level of detail, low-frequency Gaussian noise, relative to the absorbance of the
         /// cytoplasm.
-        clouds: Number = Number::uniform(0.08, 0.28), 0..=2;
+        clouds: Number = Number::uniform(0.05, 0.18), 0..=2;
         /// Standard deviation of the smoothing of that noise.
         clouds_um: Number = Number::log_normal(4.0, 0.7).at_least(0.7).at_most(14.0), 0.1..=100, "µm";
         /// Amplitude of the second level of detail, relative to the absorbance of the cytoplasm: spots, made by
@@ -316,7 +316,7 @@ section! {
         granules: Number
             (given f64 as granules: "Number of granules per 100 µm², 0 if the cell is not granular.") = Number::log_normal(12.0, 0.6), 0..=1000;
         /// Number of specks per 100 µm²: dark dots and short rods, such as granules, or bacteria on the cell.
-        specks: Number = Number::log_normal(2.0, 0.9).at_most(30.0), 0..=1000;
+        specks: Number = Number::log_normal(1.5, 0.9).at_most(15.0), 0..=1000;
         /// Degeneration: dark granular material at the rim and in patches, and a frayed rim. The number is the
         /// absorbance of the material relative to the cytoplasm. Above 1, the material covers the cell.
         degeneration: Number (given f64) = 0.0, 0..=5;

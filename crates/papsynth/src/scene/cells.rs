@@ -376,6 +376,8 @@ fn draw_fold(recipe: &Recipe, pliability: f64, rng: &mut Stream) -> Option<Fold>
     };
     /// Depth of a rolled rim relative to that of a flap.
     const ROLLED: f64 = 0.45;
+    /// Bending radius of a rolled rim relative to that of a flap.
+    const ROLLED_RADIUS: f64 = 2.0;
     /// Each side of a cell that is folded over is folded at half the radius.
     const FOLDED_OVER: f64 = 0.5;
     let depth = match form {
@@ -383,6 +385,7 @@ fn draw_fold(recipe: &Recipe, pliability: f64, rng: &mut Stream) -> Option<Fold>
         FoldForm::Roll => depth * ROLLED,
         FoldForm::FoldedOver => FOLDED_OVER,
     };
+    let radius_um = if form == FoldForm::Roll { ROLLED_RADIUS * radius_um } else { radius_um };
     Some(Fold { form, direction_deg, depth, curvature, waviness, radius_um })
 }
 

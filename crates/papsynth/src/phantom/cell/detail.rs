@@ -1,4 +1,4 @@
-//! Detail of cytoplasm: clouds, flecks, fine texture, cytoskeleton, degeneration, endoplasm, halo.
+//! Detail of cytoplasm: clouds, flecks, fine texture, cytoskeleton, degeneration, endoplasm.
 
 use multiversion::multiversion;
 use voronoi_cytoskeleton::{LineParams, draw_into};
@@ -248,7 +248,7 @@ const STEPS: usize = 6;
 
 /// Returns a ramp: 1 inside a polygon scaled by `inner` about `centre`, 0 outside the polygon scaled by `outer`, with
 /// equal steps between.
-fn ramp(like: &Tile, polygon: &[Point], centre: Point, inner: f64, outer: f64) -> Tile {
+pub(super) fn ramp(like: &Tile, polygon: &[Point], centre: Point, inner: f64, outer: f64) -> Tile {
     let scaled = |step: usize| {
         let factor = inner + (outer - inner) * (step as f64 + 0.5) / STEPS as f64;
         scaled_about(polygon, centre, factor)
@@ -379,24 +379,6 @@ fn thicken(row: &mut [f32], inside: &[f32], density: f32) {
     for (value, inside) in row.iter_mut().zip(inside) {
         *value *= 1.0 + inside * density;
     }
-}
-
-/// Applies the halo of a koilocyte: the cleared space around the nucleus and the condensed cytoplasm at its edge.
-pub(super) fn add_halo(absorbance: &mut Tile, nucleus: Point, cell: &CellContext<'_>) {
-    /// Outer radius of the condensed rim, relative to the cleared space.
-    const RIM: f64 = 1.35;
-    let Some(halo) = cell.body.halo else { return };
-    let edge = perturbed_circle(halo.radius_um / cell.pixel_um(), 0.12, 0.10, &mut cell.stream("halo"));
-    let edge: Vec<Point> = edge.iter().map(|p| [nucleus[0] + 1.15 * p[0], nucleus[1] + 0.87 * p[1]]).collect();
-    let near = Tile::around(&scaled_about(&edge, nucleus, RIM), 1.0);
-    let clear = ramp(&near, &edge, nucleus, 0.88, 1.0);
-    let mut factor = ramp(&near, &edge, nucleus, 1.0, RIM);
-    for (factor, clear) in factor.values.iter_mut().zip(&clear.values) {
-        *factor = (1.0 + halo.rim as f32 * (*factor - clear)) * (1.0 - halo.clearing as f32 * clear);
-    }
-    absorbance.blend(&factor, |values, factors| {
-        values.iter_mut().zip(factors).for_each(|(value, factor)| *value *= factor);
-    });
 }
 
 #[cfg(test)]

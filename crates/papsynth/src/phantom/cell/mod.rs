@@ -5,6 +5,7 @@ use cloth_verlet::{Crease, FoldKind, PixelGrid, Sheet, SheetSpec, Wave, crease_o
 
 mod detail;
 mod fine_texture;
+mod halo;
 mod outline;
 mod specks;
 mod wrinkles;
@@ -203,7 +204,7 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
     let mut canvas = vec![0.0; absorbance.values.len() + wrinkles::LANES];
     wrinkles.add(&mut absorbance, &coverage, &mut canvas);
     let inner = detail::add_endoplasm(&mut absorbance, &plan.outline, nucleus, cell);
-    detail::add_halo(&mut absorbance, nucleus, cell);
+    halo::add_halo(&mut absorbance, nucleus, cell);
     detail::add_detail(&mut absorbance, &coverage, inner, cell, &mut rng)?;
     let lines = &mut canvas[..coverage.values.len()];
     detail::add_cytoskeleton(&mut absorbance, &plan.outline, cell, lines, &mut rng)?;
@@ -263,6 +264,25 @@ fn flat(absorbance: &mut Tile, coverage: &Tile, profile: &[f64], centre: Point, 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_edge_of_a_flap_is_on_its_crease() {
+        let outline: Vec<Point> = (0..90)
+            .map(|k| f64::from(k) / 90.0 * core::f64::consts::TAU)
+            .map(|a| [30.0 * libm::cos(a), 20.0 * libm::sin(a)])
+            .collect();
+        let flap = Crease {
+            curvature: 0.01,
+            ..Crease::straight([12.0, 0.0], -core::f64::consts::FRAC_PI_2, 0.5, FoldKind::Flap)
+        };
+        let pieces = crease_outline(&outline, &flap).unwrap();
+        let edge = edge_of_flap(&pieces, &flap).unwrap();
+        assert!(edge.iter().all(|p| (0.0..=0.6).contains(&flap.distance_beyond(*p))), "{edge:?}");
+        let [low, high] = [f64::min, f64::max].map(|of| edge.iter().map(|p| p[1]).reduce(of).unwrap());
+        assert!((36.0..37.5).contains(&(high - low)), "{low} to {high}");
+        assert_eq!(edge_of_flap(&pieces, &Crease { kind: FoldKind::Roll { turns: 1 }, ..flap }), None);
+        assert_eq!(edge_of_flap(&[outline], &Crease { point: [100.0, 0.0], ..flap }), None);
+    }
 
     #[test]
     fn a_nucleus_displaces_cytoplasm_in_proportion_to_its_thickness() {

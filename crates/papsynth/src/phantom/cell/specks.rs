@@ -23,7 +23,7 @@ pub(super) fn add_granules(absorbance: &mut Tile, per_100_um2: f64, pixel_um: f6
 }
 
 /// Fraction of specks that lie near the previous one, and the standard deviation of their distance in x and y, µm.
-const GROUPED: f64 = 0.75;
+const GROUPED: f64 = 0.85;
 const GROUP_UM: f64 = 3.0;
 
 /// Fraction of specks that are rods, and their length, µm: minimum, maximum.

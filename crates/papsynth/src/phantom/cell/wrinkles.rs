@@ -17,7 +17,7 @@ const STEP_UM: f64 = 0.5;
 /// along rims are about as dark and as frequent as in real fields (docs/decisions.md, "Rolled rims").
 const ROLLED: f64 = 0.2;
 /// Thickness of a rolled stretch relative to that of a wrinkle: minimum, maximum.
-const ROLLED_THICKNESS: [f64; 2] = [0.5, 2.0];
+const ROLLED_THICKNESS: [f64; 2] = [0.4, 1.6];
 /// Width of a rolled stretch (standard deviation of its profile), µm: minimum, maximum.
 const ROLLED_UM: [f64; 2] = [0.4, 0.9];
 /// Distance of a rolled stretch from the rim, in radii of the cell: minimum, maximum.
@@ -492,6 +492,19 @@ mod tests {
             }
             assert!(painted > 250, "{painted}");
         }
+    }
+
+    #[test]
+    fn points_are_at_equal_steps_along_a_path() {
+        let path = [[0.0, 0.0], [3.0, 0.0], [3.0, 0.2], [3.0, 4.0]];
+        let found = at_steps(&path, 0.5);
+        assert_eq!(found.len(), 15);
+        for (k, p) in found.iter().enumerate() {
+            let along = 0.5 * k as f64;
+            let expected = [along.min(3.0), (along - 3.0).max(0.0)];
+            assert!((p[0] - expected[0]).abs() < 1e-9 && (p[1] - expected[1]).abs() < 1e-9, "{p:?} {expected:?}");
+        }
+        assert_eq!(at_steps(&[[1.0, 2.0]], 0.5), [[1.0, 2.0]]);
     }
 
     #[test]
