@@ -177,8 +177,9 @@ fn equalise(values: &mut [f32]) {
 /// noise on cytoplasm and nuclei of real EDF images.
 const HALF_UNCORRELATED: f64 = 80.0;
 
-/// Grey levels, relative to the highest one, between which the noise of dark areas changes from uncorrelated, without
-/// lines, to that of bright ones: fitted to the noise in nuclei and piles of cells of 24 real EDF images.
+/// Grey levels, relative to the highest one, between which noise changes from uncorrelated to as correlated as that of
+/// the empty slide; the first one is an extrapolation. Fitted to the flattest places at each grey level in nuclei and
+/// cells of 24 real EDF images.
 const DARK: [f32; 2] = [-0.1, 0.6];
 
 /// Increase of the variance of noise where a plane is sharper than others, relative to the empty slide, where several
@@ -321,7 +322,7 @@ mod tests {
 
     #[test]
     fn noise_has_the_specified_correlation_and_the_same_variance() {
-        let (noise, variance) = fused(|_| 2000.0, 30.0, 0.02, [12, 12]);
+        let (noise, variance) = fused(|_| 3000.0, 30.0, 0.02, [12, 12]);
         // Some 10⁵ pixels: a standard error of .003 for each.
         assert!((variance / 900.0 - 1.0).abs() < 0.03, "{variance}");
         for (step, wanted) in [(1, 0.2), (WIDTH, 0.4), (2, SECOND_NEIGHBOUR[0])] {
@@ -386,16 +387,11 @@ mod tests {
     }
 
     #[test]
-    fn noise_in_dark_areas_is_white() {
-        for amplitude in [0.0, 400.0] {
-            let waves = |i| 800.0 + (amplitude * libm::sin((i % WIDTH) as f64 * 0.7)) as f32;
-            let (noise, variance) = fused(waves, 30.0, 0.02, [14, 14]);
-            assert!((variance / 900.0 - 1.0).abs() < 0.03, "{variance}");
-            for step in [1, 2, WIDTH, WIDTH + 1] {
-                let found = product(&noise, step) / variance;
-                assert!(found.abs() < 0.012, "{amplitude} {step}: {found}");
-            }
-        }
+    fn noise_in_dark_areas_is_less_correlated() {
+        let (noise, variance) = fused(|_| 800.0, 30.0, 0.02, [14, 14]);
+        assert!((variance / 900.0 - 1.0).abs() < 0.03, "{variance}");
+        let [across, down] = [1, WIDTH].map(|step| product(&noise, step) / variance);
+        assert!((0.03..0.1).contains(&across) && (0.06..0.2).contains(&down), "{across} {down}");
     }
 
     #[test]

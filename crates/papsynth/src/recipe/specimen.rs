@@ -295,7 +295,7 @@ section! {
         endoplasm: Number (given f64) = Number::log_normal(0.13, 0.5), 0..=2;
         /// Amplitude of the first level of detail, low-frequency Gaussian noise, relative to the absorbance of the
         /// cytoplasm.
-        clouds: Number = Number::uniform(0.05, 0.18), 0..=2;
+        clouds: Number = Number::uniform(0.06, 0.22), 0..=2;
         /// Standard deviation of the smoothing of that noise.
         clouds_um: Number = Number::log_normal(4.0, 0.7).at_least(0.7).at_most(14.0), 0.1..=100, "µm";
         /// Amplitude of the second level of detail, relative to the absorbance of the cytoplasm: spots, made by
