@@ -46,7 +46,7 @@ pub fn sheets(params: &ClothParams) -> Workload {
 pub fn thickness() -> Workload {
     let cloth = Cloth::new(&ClothParams { steps: 12, ..ClothParams::default() }).expect("the parameters are valid");
     let mut sheet = cloth.crumple(&outline(200, 3.0), &mut rng(1)).expect("the outline has an area");
-    let crease = Crease { point: [30.0, 10.0], direction_rad: 1.0, curvature: 0.0, radius: 4.0, kind: FoldKind::Flap };
+    let crease = Crease::straight([30.0, 10.0], 1.0, 4.0, FoldKind::Flap);
     sheet.fold(&crease).expect("the crease meets the sheet");
     let view = PixelGrid { origin: [-110.0, -110.0], pixel_size: 1.0 };
     let mut image = vec![0.0; SHEET_PX * SHEET_PX];

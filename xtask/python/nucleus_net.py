@@ -5,7 +5,7 @@
 
 A SET is a data set of `papsynth generate`, or a folder of data sets, of which the masks of nuclei are learned, or a
 folder of PNG and CSV files with the centres of nuclei (y, x), of which discs are learned. SET:N uses N fields, evenly
-spread over its files. Each batch has equally many crops of all SETs; the last third of the steps uses the last SET
+spread over its files. Each batch has equally many crops of all SETs; the last 60 % of the steps use the last SET
 alone, so that a network that learns from synthetic and real fields ends with real ones. In data sets, a part of the
 crops show objects that look like nuclei, and their pixels count as much as those of nuclei. FOLDER holds real fields
 with centres and frames.csv with their grades. A nucleus is found if a detection lies within 12 pixels (4 µm). Writes
@@ -37,7 +37,7 @@ SMALLEST = 60  # area of a detection, pixels
 SCALES = (1.0, 1.2)  # of the image with a mask, whose pixel size is not known
 CHANNELS = 12  # of the first level of the network
 CONTRAST = 4.0  # factor on the images
-LAST = 1 / 3  # part of the steps in which only the last set is used
+LAST = 0.6  # part of the steps in which only the last set is used
 MIMICS = (4, 5)  # first and last semantic class of objects that look like nuclei: shreds and leukocytes
 MIMIC_CROPS = 0.35  # share of the crops that are chosen to show such objects
 NUCLEUS_WEIGHT = 3.0  # of pixels of nuclei, and of objects that look like them

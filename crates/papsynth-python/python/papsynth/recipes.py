@@ -469,8 +469,8 @@ class Cytoplasm(Section):
     """Number of wrinkles: ridges and pleats. A fifth of them are rolled stretches of the rim. From 0 to 100."""
 
     wrinkle_thickness: Number | None = None
-    """Additional thickness at the crest of a wrinkle, relative to the flat sheet. Rolled stretches of the rim have 0.8
-    to 3 times this thickness. From 0 to 5.
+    """Additional thickness at the crest of a wrinkle, relative to the flat sheet. Rolled stretches of the rim have 0.4
+    to 1.6 times this thickness. From 0 to 5.
     """
 
     wrinkle_um: Number | None = None
@@ -812,6 +812,9 @@ class Folds(Section):
 
     curvature: Number | None = None
     """Curvature of a crease times the radius of the cell, bent to either side: 0 is a straight line. From 0 to 2."""
+
+    waviness: Number | None = None
+    """Amplitude of the waves of a crease, as a fraction of the radius of the cell. From 0 to 0.5."""
 
     radius_um: Number | None = None
     """Bending radius of a fold. From 0.1 to 5 µm."""
