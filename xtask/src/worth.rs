@@ -27,6 +27,9 @@ const FOR_TRAINING: [&str; 2] = [
 /// Factor of `papsynth generate --widen`.
 const WIDEN: &str = "1.5";
 
+/// Version of `nucleus_net.py`: results of another version are kept apart.
+const METHOD: u32 = 2;
+
 /// Presets of the overlapping cells on which networks are trained: name and number of fields.
 const OVERLAP_TRAINING: [(&str, &str); 2] = [("lbc", "300"), ("dense", "80")];
 
@@ -85,7 +88,7 @@ pub(crate) fn run(workspace: &Workspace, options: &Worth) -> Result<()> {
     };
     let python = python::environment(workspace, "worth", PACKAGES)?;
     let folder = workspace.target.join("worth");
-    let results = folder.join(format!("results-{}-steps", options.steps));
+    let results = folder.join(format!("results-{METHOD}-{}-steps", options.steps));
     shell::make(&results)?;
     let halves = halves(&reference.join("cervix93"), &folder)?;
     let mut trainings = Vec::new();

@@ -20,16 +20,16 @@ const MOST_PARTS: f64 = 1000.0;
 /// A fold along a line, a parabola or a wavy line. The part of the sheet beyond it is bent up around a tube on it.
 ///
 /// A straight fold does not stretch the sheet. A curved one is a straight one of a sheared sheet: it preserves areas,
-/// and stretches by about the distance from the vertex times the curvature.
+/// and stretches by about the slope of the line relative to its direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crease {
-    /// A point of the line.
+    /// Origin of the line: the vertex of its parabola.
     pub point: Point,
     /// Direction of the line, as an angle from +x towards +y. The side in the direction (−sin, cos) is beyond the
     /// line.
     pub direction_rad: f64,
-    /// Curvature at `point`, which is the vertex of a parabola, in 1 over the unit of the sheet: 0 is a straight line,
-    /// a positive one bends towards the side beyond.
+    /// Curvature of the parabola at its vertex, in 1 over the unit of the sheet: 0 is a straight line, a positive one
+    /// bends towards the side beyond.
     pub curvature: f64,
     /// Waves of the line, added to the parabola.
     pub waves: [Wave; 2],
@@ -63,7 +63,7 @@ pub enum FoldKind {
 }
 
 impl Crease {
-    /// Returns a crease along a straight line. The fields have the same names.
+    /// Returns a crease along a straight line. The parameters are those of the fields.
     #[must_use]
     pub fn straight(point: Point, direction_rad: f64, radius: f64, kind: FoldKind) -> Self {
         Self { point, direction_rad, curvature: 0.0, waves: Default::default(), radius, kind }
@@ -515,6 +515,7 @@ mod tests {
             (2.0, 0.008, CREASE.waves, FoldKind::Flap),
             (0.3, -0.008, CREASE.waves, FoldKind::Roll { turns: 1 }),
             (2.0, 0.008, WAVES, FoldKind::Flap),
+            (0.3, -0.008, WAVES, FoldKind::Roll { turns: 1 }),
         ] {
             let crease = Crease { direction_rad, curvature, waves, kind, ..CREASE };
             let mut sheet = flat();

@@ -366,8 +366,12 @@ mod tests {
 
     #[test]
     fn noise_on_structure_is_uncorrelated_except_along_lines() {
-        // Waves of 3800 levels, brighter than dark areas.
-        let waves = |i| 12_000.0 + 3800.0 * libm::sin((i % WIDTH) as f64 * 0.7) as f32;
+        for [level, amplitude] in [[12_000.0, 3800.0], [3900.0, 3700.0]] {
+            is_uncorrelated_except_along_lines(|i| level + amplitude * libm::sin((i % WIDTH) as f64 * 0.7) as f32);
+        }
+    }
+
+    fn is_uncorrelated_except_along_lines(waves: impl Fn(usize) -> f32) {
         let (noise, variance) = fused(waves, 30.0, 0.02, [14, 14]);
         // The filter: one pixel, and lines along a row and a column without their common mean.
         let one = |offset: i64| f64::from(u8::from(offset == 0));

@@ -257,9 +257,9 @@ section! {
         depth: Number = Number::uniform(0.10, 0.50), 0.02..=0.9;
         /// Curvature of a crease times the radius of the cell, bent to either side: 0 is a straight line.
         curvature: Number = Number::uniform(0.10, 0.60), 0..=2;
-        /// Amplitude of the waves of a crease, as a fraction of the radius of the cell.
-        waviness: Number = Number::uniform(0.01, 0.06), 0..=0.5;
-        /// Bending radius of a fold.
+        /// Amplitude of the longer of two waves of a crease, as a fraction of the radius of the cell.
+        waviness: Number = Number::uniform(0.04, 0.12), 0..=0.5;
+        /// Bending radius of a flap. A rolled rim has twice this radius.
         radius_um: Number = Number::uniform(0.4, 1.2), 0.1..=5, "µm";
     }
 }
@@ -293,8 +293,8 @@ section! {
         wrinkle_um: Number (given f64) = Number::uniform(0.3, 1.3), 0.05..=5, "µm";
         /// Additional density and granularity of the cytoplasm around the nucleus, relative to the rest.
         endoplasm: Number (given f64) = Number::log_normal(0.13, 0.5), 0..=2;
-        /// Amplitude of the first level of detail, low-frequency Gaussian noise, relative to the absorbance of the
-        /// cytoplasm.
+        /// Amplitude of the first level of detail, low-frequency noise, relative to the absorbance of the cytoplasm.
+        /// Dark places are smaller and stronger than pale ones.
         clouds: Number = Number::uniform(0.06, 0.22), 0..=2;
         /// Standard deviation of the smoothing of that noise.
         clouds_um: Number = Number::log_normal(4.0, 0.7).at_least(0.7).at_most(14.0), 0.1..=100, "µm";

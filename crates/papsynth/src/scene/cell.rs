@@ -58,11 +58,11 @@ pub(crate) fn stretched([x, y]: [f64; 2], elongation: f64, axis_rad: f64) -> [f6
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Halo {
-    /// Radius, µm.
+    /// Radius of a disc of about the same area, µm.
     pub radius_um: f64,
     /// Fraction of the cytoplasm that is missing there.
     pub clearing: f64,
-    /// Additional density of the cytoplasm at its edge, relative to the rest.
+    /// Additional density of the cytoplasm at its edge, relative to the rest: the mean. One side is denser.
     pub rim: f64,
 }
 
@@ -78,7 +78,7 @@ pub struct Fold {
     pub depth: f64,
     /// Curvature of the crease times the radius of the cell; a positive one bends towards the rim.
     pub curvature: f64,
-    /// Amplitude of the waves of the crease, as a fraction of the radius of the cell.
+    /// Amplitude of the longer of two waves of the crease, as a fraction of the radius of the cell.
     pub waviness: f64,
     /// Bending radius, µm.
     pub radius_um: f64,

@@ -342,8 +342,8 @@ fn draw_detail(recipe: &Recipe, pliability: f64, rng: &mut Stream, own: &impl Fn
 }
 
 fn draw_halo(halo: Option<&HaloStatistics>, nucleus_um: f64, cell_um: f64, rng: &mut Stream) -> Option<Halo> {
-    /// Largest radius of a halo relative to its cell: a ring of cytoplasm remains outside.
-    const LARGEST: f64 = 0.8;
+    /// Largest radius of a halo relative to its cell. A halo may be 1.6 times as long on one side.
+    const LARGEST: f64 = 0.6;
     let halo = halo.filter(|halo| random::chance(halo.probability, rng))?;
     let radius = halo.radius.median * libm::exp(halo.radius.log_sd * random::normal(rng));
     Some(Halo {

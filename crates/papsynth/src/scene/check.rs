@@ -44,7 +44,7 @@ const RANGES: &[(&str, f64, f64)] = &[
     ("direction_deg", -1e6, 1e6), ("bend_deg", -1e6, 1e6), ("dyes", 0.0, 1e6), ("dyes.nucleus", 0.0, 1e6),
     ("bacillus", 0.0, 1e6), ("speckle", 0.0, 1e6), ("absorbance", 0.0, 1e4), ("cytoplasm_absorbance", 0.0, 1e4),
     ("texture", 0.0, 1e4), ("shreds", 0.0, 1e4), ("nucleus_absorbance", 0.0, 1e4), ("phase_rad", -1e3, 1e3),
-    ("fold.radius_um", 0.01, 5.0), ("radius_um", 0.01, 5e3), ("diameter_um", 0.05, 5e3), ("length_um", 0.05, 5e3), ("width_um", 0.01, 5e3),
+    ("fold.radius_um", 0.01, 10.0), ("radius_um", 0.01, 5e3), ("diameter_um", 0.05, 5e3), ("length_um", 0.05, 5e3), ("width_um", 0.01, 5e3),
     ("segment_length_um", 0.05, 50.0), ("yeast_diameter_um", 0.05, 20.0), ("cytoplasm_diameter_um", 0.0, 100.0), ("colony_radius_um", 0.0, 500.0),
     ("fibre_width_um", 0.01, 5.0), ("grain_um", 0.05, 5.0), ("overhang_um", 0.0, 20.0), ("wrinkle_um", 0.01, 5.0),
     ("clouds_um", 0.05, 100.0), ("fray_um", 0.0, 5.0), ("rim_um", 0.0, 10.0), ("edge_um", 0.0, 3.0),
@@ -118,7 +118,7 @@ fn object(value: Value, pixel_um: f64, farthest_um: f64, ids: &mut BTreeSet<u32>
         return Err(ErrorKind::SameId);
     }
     let reach_um = object.body.reach_um(pixel_um).max(match &object.body {
-        Body::Cell(cell) => 2.0 * cell.nucleus.radius_um.max(cell.halo.map_or(0.0, |halo| halo.radius_um)),
+        Body::Cell(cell) => (2.0 * cell.nucleus.radius_um).max(2.5 * cell.halo.map_or(0.0, |halo| halo.radius_um)),
         _ => 0.0,
     });
     if reach_um > farthest_um {

@@ -67,7 +67,7 @@ const TEXTURE_THICKNESS: f32 = 1.3;
 const SKEWNESS: f32 = 0.25;
 
 /// Multiplies a row by 1 plus the clouds and the flecks above a threshold, times their strengths, plus the texture.
-/// Negative factors count as 0.
+/// Clouds are skewed by their square, which increases their standard deviation by 6 %. Negative factors count as 0.
 ///
 /// The texture adds up at random over the thickness, so that its relative deviation is inversely proportional to the
 /// root of the thickness: it is strong at thin rims and weak on folds.

@@ -32,7 +32,7 @@ const POINTS: usize = 180;
 /// Largest angle between the two creases of a cell folded from both sides, radians.
 const SKEW: f64 = 0.45;
 
-/// Waves of a crease: relative amplitude, and wavelength in radii of the cell, minimum and maximum.
+/// Waves of a crease: amplitude relative to that of the recipe; shortest and longest wavelength in radii of the cell.
 const WAVES: [[f64; 3]; 2] = [[1.0, 0.8, 1.8], [0.35, 0.3, 0.6]];
 
 /// Distance between the points of a roughened rim, µm.
@@ -91,9 +91,10 @@ fn creases(cell: &CellContext<'_>, fold: Fold, outline: &[Point], centre: Point)
         let normal = [libm::cos(direction), libm::sin(direction)];
         let reach =
             outline.iter().map(|p| (p[0] - centre[0]) * normal[0] + (p[1] - centre[1]) * normal[1]).fold(0.0, f64::max);
-        // The nucleus is too stiff to fold, so the crease keeps a distance from it.
+        // The nucleus is too stiff to fold, so the crease with its waves keeps a distance from it.
         let nucleus_at = off_centre[0] * normal[0] + off_centre[1] * normal[1];
-        let at = (reach - fold.depth * radius).max(nucleus_at + 1.3 * nucleus_radius);
+        let waves = fold.waviness * radius * WAVES.iter().map(|wave| wave[0]).sum::<f64>();
+        let at = (reach - fold.depth * radius).max(nucleus_at + 1.3 * nucleus_radius + waves);
         let kind = match fold.form {
             FoldForm::Flap | FoldForm::FoldedOver => FoldKind::Flap,
             FoldForm::Roll => FoldKind::Roll { turns: 1 },
@@ -128,11 +129,24 @@ fn creases(cell: &CellContext<'_>, fold: Fold, outline: &[Point], centre: Point)
 
 /// Returns the longest part of the outline of a folded cell that lies on the crease of a flap.
 fn edge_of_flap(pieces: &[Vec<Point>], crease: &Crease) -> Option<Vec<Point>> {
+    /// Smallest distance of the edge beyond the crease, in bending radii.
+    const ON_EDGE: f64 = 0.9;
     if crease.kind != FoldKind::Flap {
         return None;
     }
-    let parts = pieces.iter().flat_map(|piece| piece.split(|p| crease.distance_beyond(*p) <= 0.0));
-    parts.max_by_key(|part| part.len()).filter(|part| part.len() > 1).map(<[Point]>::to_vec)
+    let inside = |p: &Point| crease.distance_beyond(*p) < ON_EDGE * crease.radius;
+    let parts = |piece: &Vec<Point>| {
+        // An edge does not begin in the middle of a part.
+        let first = piece.iter().position(inside).unwrap_or(0);
+        let around: Vec<Point> = piece.iter().cycle().skip(first).take(piece.len() + 1).copied().collect();
+        around.split(inside).filter(|part| part.len() > 1).map(<[Point]>::to_vec).collect::<Vec<_>>()
+    };
+    pieces.iter().flat_map(parts).max_by(|a, b| length(a).total_cmp(&length(b)))
+}
+
+/// Returns the length of a path.
+fn length(path: &[Point]) -> f64 {
+    path.windows(2).map(|ends| libm::hypot(ends[1][0] - ends[0][0], ends[1][1] - ends[0][1])).sum()
 }
 
 fn crumple(
@@ -271,16 +285,15 @@ mod tests {
             .map(|k| f64::from(k) / 90.0 * core::f64::consts::TAU)
             .map(|a| [30.0 * libm::cos(a), 20.0 * libm::sin(a)])
             .collect();
-        let flap = Crease {
-            curvature: 0.01,
-            ..Crease::straight([12.0, 0.0], -core::f64::consts::FRAC_PI_2, 0.5, FoldKind::Flap)
-        };
+        let straight = Crease::straight([12.0, 0.0], -core::f64::consts::FRAC_PI_2, 0.5, FoldKind::Flap);
+        let flap = Crease { curvature: 0.01, ..straight };
         let pieces = crease_outline(&outline, &flap).unwrap();
-        let edge = edge_of_flap(&pieces, &flap).unwrap();
-        assert!(edge.iter().all(|p| (0.0..=0.6).contains(&flap.distance_beyond(*p))), "{edge:?}");
-        let [low, high] = [f64::min, f64::max].map(|of| edge.iter().map(|p| p[1]).reduce(of).unwrap());
-        // Chord of the ellipse; the points are up to 2 apart.
-        assert!((32.0..36.5).contains(&(high - low)), "{low} to {high}");
+        for crease in [flap, straight] {
+            let edge = edge_of_flap(&crease_outline(&outline, &crease).unwrap(), &crease).unwrap();
+            assert!(edge.iter().all(|p| (0.45..=0.51).contains(&crease.distance_beyond(*p))), "{edge:?}");
+            // Chord of the ellipse.
+            assert!((35.0..36.7).contains(&length(&edge)), "{edge:?}");
+        }
         assert_eq!(edge_of_flap(&pieces, &Crease { kind: FoldKind::Roll { turns: 1 }, ..flap }), None);
         assert_eq!(edge_of_flap(&[outline], &Crease { point: [100.0, 0.0], ..flap }), None);
     }

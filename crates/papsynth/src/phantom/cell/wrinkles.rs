@@ -1,4 +1,5 @@
-//! Wrinkles: ridges and pleats of the cytoplasm, along the rim, across the cell, or forked.
+//! Wrinkles: ridges and pleats of the cytoplasm, along the rim, across the cell, or forked; rolled stretches of the rim
+//! and ridges along the edges of flaps.
 
 use core::ops::Range;
 
@@ -14,7 +15,7 @@ use crate::random;
 const STEP_UM: f64 = 0.5;
 
 /// Fraction of wrinkles that are a rolled stretch of the rim. This and the next three numbers were set so that lines
-/// along rims are about as dark and as frequent as in real fields (docs/decisions.md, "Rolled rims").
+/// along rims are about as frequent as in real fields (docs/decisions.md, "Rolled rims"), and as dark, by eye.
 const ROLLED: f64 = 0.2;
 /// Thickness of a rolled stretch relative to that of a wrinkle: minimum, maximum.
 const ROLLED_THICKNESS: [f64; 2] = [0.4, 1.6];
@@ -35,8 +36,8 @@ const WIDTH: [f64; 2] = [0.6, 1.6];
 /// Fraction of the remaining wrinkles that fork off a previous one.
 const FORKED: f64 = 0.35;
 
-/// Fraction of the other wrinkles that are pleats: two dark lines with a paler band between, instead of ridges. This and the next two
-/// numbers were set by eye, beside cells of real fields.
+/// Fraction of the other wrinkles that are pleats: two dark lines with a paler band between, instead of ridges. This
+/// and the next two numbers were set by eye, beside cells of real fields.
 const PLEATS: f64 = 0.5;
 /// Width of a pleat relative to that of a ridge: minimum, maximum.
 const PLEAT_WIDTH: [f64; 2] = [0.8, 2.5];
@@ -61,11 +62,13 @@ struct Wrinkle {
 pub(super) struct Wrinkles {
     /// Rolled stretches of the rim.
     rolled: Vec<Wrinkle>,
+    /// Wrinkles, and ridges along the edges of flaps.
     others: Vec<Wrinkle>,
 }
 
 impl Wrinkles {
-    /// Draws the wrinkles of a cell with this outline. `edges` are the edges of its flaps.
+    /// Draws the wrinkles of a cell with this outline, and ridges along `edges`, the edges of its flaps. A cell without
+    /// wrinkles has no ridges either.
     pub(super) fn new(outline: &[Point], edges: &[Vec<Point>], cell: &CellContext<'_>) -> Self {
         let (detail, pixel_um, rng) = (&cell.body.detail, cell.pixel_um(), &mut cell.stream("wrinkles"));
         let mut wrinkles = Self { rolled: Vec::new(), others: Vec::new() };
@@ -74,8 +77,7 @@ impl Wrinkles {
         }
         let step = STEP_UM / pixel_um;
         let rim = fsd_shape::resample_along(outline, random::count(fsd_shape::perimeter(outline) / step).max(8));
-        for edge in edges {
-            let path = at_steps(edge, step);
+        for path in edges.iter().map(|edge| at_steps(edge, step)).filter(|path| path.len() > 1) {
             let sizes = WrinkleSizes { width_um: EDGE_UM, thickness: EDGE_THICKNESS, pleat: false };
             let profile = WrinkleProfile::new(path.len(), &sizes, cell, rng);
             wrinkles.others.push(Wrinkle { path, profile });
