@@ -482,8 +482,8 @@ class Cytoplasm(Section):
     """Additional density and granularity of the cytoplasm around the nucleus, relative to the rest. From 0 to 2."""
 
     clouds: Number | None = None
-    """Amplitude of the first level of detail, low-frequency Gaussian noise, relative to the absorbance of the
-    cytoplasm. From 0 to 2.
+    """Amplitude of the first level of detail, low-frequency noise, relative to the absorbance of the cytoplasm. Dark
+    places are smaller and stronger than pale ones. From 0 to 2.
     """
 
     clouds_um: Number | None = None
@@ -814,10 +814,10 @@ class Folds(Section):
     """Curvature of a crease times the radius of the cell, bent to either side: 0 is a straight line. From 0 to 2."""
 
     waviness: Number | None = None
-    """Amplitude of the waves of a crease, as a fraction of the radius of the cell. From 0 to 0.5."""
+    """Amplitude of the longer of two waves of a crease, as a fraction of the radius of the cell. From 0 to 0.5."""
 
     radius_um: Number | None = None
-    """Bending radius of a fold. From 0.1 to 5 µm."""
+    """Bending radius of a flap. A rolled rim has twice this radius. From 0.1 to 5 µm."""
 
 
 @dataclass(kw_only=True, slots=True)
