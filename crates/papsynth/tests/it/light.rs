@@ -359,7 +359,9 @@ fn nuclei_stand_out_most_near_the_papers_filter() {
 fn extra_blur_and_a_wider_condenser_reduce_contrast() {
     let roughness = |recipe: &Recipe| {
         let light = light(recipe);
-        light.windows(2).map(|w| f64::from(w[1] - w[0]) * f64::from(w[1] - w[0])).sum::<f64>()
+        // Differences along rows of 160 px.
+        let steps = light.chunks_exact(160).flat_map(|row| row.windows(2));
+        steps.map(|w| f64::from(w[1] - w[0]) * f64::from(w[1] - w[0])).sum::<f64>()
     };
     let recipe = small();
     let mut softer = recipe.clone();
@@ -371,7 +373,7 @@ fn extra_blur_and_a_wider_condenser_reduce_contrast() {
     let mut wide = out.clone();
     set(&mut wide, |optics| *optics.condenser_na = 0.9.into());
     let [found, narrow] = [&wide, &out].map(&roughness);
-    assert!(found < 0.95 * narrow, "{found} {narrow}");
+    assert!(found < 0.8 * narrow, "{found} {narrow}");
 }
 
 #[test]
