@@ -342,7 +342,7 @@ fn draw_detail(recipe: &Recipe, pliability: f64, rng: &mut Stream, own: &impl Fn
 }
 
 fn draw_halo(halo: Option<&HaloStatistics>, nucleus_um: f64, cell_um: f64, rng: &mut Stream) -> Option<Halo> {
-    /// Largest radius of a halo relative to its cell. A halo may be 1.6 times as long on one side.
+    /// Largest radius of a halo relative to its cell. On one side, a halo may reach 1.6 times as far.
     const LARGEST: f64 = 0.6;
     let halo = halo.filter(|halo| random::chance(halo.probability, rng))?;
     let radius = halo.radius.median * libm::exp(halo.radius.log_sd * random::normal(rng));

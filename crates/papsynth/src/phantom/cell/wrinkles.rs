@@ -78,8 +78,8 @@ impl Wrinkles {
         let step = STEP_UM / pixel_um;
         let rim = fsd_shape::resample_along(outline, random::count(fsd_shape::perimeter(outline) / step).max(8));
         for path in edges.iter().map(|edge| at_steps(edge, step)).filter(|path| path.len() > 1) {
-            let sizes = WrinkleSizes { width_um: EDGE_UM, thickness: EDGE_THICKNESS, pleat: false };
-            let profile = WrinkleProfile::new(path.len(), &sizes, cell, rng);
+            let kind = WrinkleKind { width_um: EDGE_UM, thickness: EDGE_THICKNESS, pleat: false };
+            let profile = WrinkleProfile::new(path.len(), &kind, cell, rng);
             wrinkles.others.push(Wrinkle { path, profile });
         }
         for _ in 0..detail.wrinkles {
@@ -101,14 +101,14 @@ impl Wrinkles {
                 _ => across(outline, step, rng),
             };
             let pleat = !rolled && random::chance(PLEATS, rng);
-            let sizes = match rolled {
-                true => WrinkleSizes { width_um: ROLLED_UM, thickness: ROLLED_THICKNESS, pleat },
+            let kind = match rolled {
+                true => WrinkleKind { width_um: ROLLED_UM, thickness: ROLLED_THICKNESS, pleat },
                 false => {
                     let width_um = WIDTH.map(|width| width * detail.wrinkle_um);
-                    WrinkleSizes { width_um, thickness: THICKNESS, pleat }
+                    WrinkleKind { width_um, thickness: THICKNESS, pleat }
                 }
             };
-            let profile = WrinkleProfile::new(path.len(), &sizes, cell, rng);
+            let profile = WrinkleProfile::new(path.len(), &kind, cell, rng);
             let same = if rolled { &mut wrinkles.rolled } else { &mut wrinkles.others };
             same.push(Wrinkle { path, profile });
         }
@@ -255,8 +255,8 @@ struct WrinkleProfile {
     factors: Vec<f64>,
 }
 
-/// The sizes of a kind of wrinkle.
-struct WrinkleSizes {
+/// A kind of wrinkle.
+struct WrinkleKind {
     /// Minimum and maximum of the width of the crest, µm.
     width_um: [f64; 2],
     /// Minimum and maximum of the thickness relative to the wrinkles of the cell.
@@ -267,13 +267,13 @@ struct WrinkleSizes {
 
 impl WrinkleProfile {
     /// Draws the profile of a wrinkle with this number of points.
-    fn new(points: usize, sizes: &WrinkleSizes, cell: &CellContext<'_>, rng: &mut Stream) -> Self {
-        let factor = if sizes.pleat { random::between(PLEAT_WIDTH[0], PLEAT_WIDTH[1], rng) } else { 1.0 };
+    fn new(points: usize, kind: &WrinkleKind, cell: &CellContext<'_>, rng: &mut Stream) -> Self {
+        let factor = if kind.pleat { random::between(PLEAT_WIDTH[0], PLEAT_WIDTH[1], rng) } else { 1.0 };
         let [width_um, thickness] =
-            [sizes.width_um, sizes.thickness].map(|range| random::between(range[0], range[1], rng));
+            [kind.width_um, kind.thickness].map(|range| random::between(range[0], range[1], rng));
         Self {
             width: factor * width_um / cell.pixel_um(),
-            pleat: sizes.pleat,
+            pleat: kind.pleat,
             strength: cell.body.detail.wrinkle_thickness * thickness,
             side: if random::chance(0.5, rng) { 1.0 } else { -1.0 },
             rise: random::between(0.05, TAPER, rng),
