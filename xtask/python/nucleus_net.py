@@ -187,9 +187,16 @@ def probability(net, image):
     return total / 8
 
 
+def away_from_border(mask):
+    """Return a mask without its regions at the border of the image."""
+    regions, _ = ndimage.label(mask)
+    border = np.concatenate([regions[0], regions[-1], regions[:, 0], regions[:, -1]])
+    return mask & ~np.isin(regions, border[border > 0])
+
+
 def detections(found):
-    """Return the centres of the regions above the threshold."""
-    regions, count = ndimage.label(ndimage.binary_opening(found > THRESHOLD, iterations=2))
+    """Return the centres of the regions above the threshold, without those at the border of the image."""
+    regions, count = ndimage.label(away_from_border(ndimage.binary_opening(found > THRESHOLD, iterations=2)))
     index = np.arange(1, count + 1)
     if count == 0:
         return np.zeros((0, 2))
@@ -204,13 +211,6 @@ def matches(found, true):
     distance = np.hypot(found[:, None, 0] - true[None, :, 0], found[:, None, 1] - true[None, :, 1])
     rows, columns = linear_sum_assignment(np.where(distance <= REACH, distance, 1e4))
     return int((distance[rows, columns] <= REACH).sum())
-
-
-def away_from_border(mask):
-    """Return a mask without its regions at the border of the image."""
-    regions, _ = ndimage.label(mask)
-    border = np.concatenate([regions[0], regions[-1], regions[:, 0], regions[:, -1]])
-    return mask & ~np.isin(regions, border[border > 0])
 
 
 def dice(net, image, mask):

@@ -28,7 +28,7 @@ from PIL import Image
 from scipy import ndimage, sparse
 from scipy.optimize import linear_sum_assignment
 
-from nucleus_net import normalized
+from nucleus_net import normalized, use_bfloat16
 
 FINE_UM = 0.5  # pixel size of the light that the networks see; masks and heat maps have pixels of 1 µm
 MATCH = 0.7  # smallest Dice coefficient of a cell that is found
@@ -163,9 +163,9 @@ def network(kind, maps):
     for channels, skip in zip(reversed(kind["channels"][:-1]), reversed(skipped)):
         x = layers.Conv2D(channels, 3, padding="same")(layers.UpSampling2D()(x))
         x = block(layers.Concatenate()([x, skip]), channels)
-    x = layers.Conv2D(factor**2, 1)(x)
+    x = layers.Conv2D(factor**2, 1, dtype="float32")(x)
     if factor > 1:
-        x = layers.Lambda(lambda y: tf.nn.depth_to_space(y, factor))(x)
+        x = layers.Lambda(lambda y: tf.nn.depth_to_space(y, factor), dtype="float32")(x)
     return tf.keras.Model(start, x)
 
 
@@ -352,6 +352,7 @@ def main():
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
     tf.keras.utils.set_random_seed(options.seed)
+    use_bfloat16()
     sets = [load(name) for name in options.train]
     if not all(any(len(field["centres"]) for field in fields) for fields in sets):
         parser.error("each training set needs at least one cell with a nucleus")

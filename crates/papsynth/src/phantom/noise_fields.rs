@@ -52,15 +52,18 @@ const PANEL: usize = 64;
 /// Buffer for a row of texels; the first texel may be repeated after the last.
 pub(crate) type Texels = [f32; SIDE + 1];
 
-/// The position and mirroring at which one object samples a noise field.
+/// The position, mirroring and stretch at which one object samples a noise field.
 ///
 /// Sampling follows the rows of the field, so a row of pixels needs only two rows of texels. The fields are isotropic,
-/// so no rotation is needed.
+/// so no rotation is needed: a stretch in any direction is a rotation of the field, which changes nothing, and an upper
+/// triangular matrix, which keeps its rows.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FieldSampler {
     origin: Point,
     /// Texels per pixel in x and y; negative if mirrored.
     step: Point,
+    /// Texels in x per pixel in y.
+    shear: f64,
 }
 
 /// Subtexel offset f of samplers: 2f(1 − f) = ⅓ is the mean over all f from 0 to 1, so that interpolation reduces the
@@ -105,12 +108,12 @@ impl FieldSampler {
         let origin = [texel(), texel()];
         let mirrored = random::below(4, rng);
         let step = |bit: usize| if mirrored & bit == 0 { 1.0 / texel_px } else { -1.0 / texel_px };
-        Self { origin, step: [step(1), step(2)] }
+        Self { origin, step: [step(1), step(2)], shear: 0.0 }
     }
 
     /// Returns the sampler on a grid of pixels `n` times as large.
     pub(crate) fn coarser(&self, n: f64) -> Self {
-        Self { step: self.step.map(|step| n * step), ..*self }
+        Self { step: self.step.map(|step| n * step), shear: n * self.shear, ..*self }
     }
 
     /// Draws a sampler for flecks, with the physical texel size.
@@ -121,6 +124,17 @@ impl FieldSampler {
     /// Draws a sampler for clouds with smoothing `sigma_px`.
     pub(crate) fn clouds<R: Rng + ?Sized>(sigma_px: f64, rng: &mut R) -> Self {
         Self::new(sigma_px / CLOUD_SIGMA, rng)
+    }
+
+    /// Returns the sampler of a field that is `stretch` times as long in a direction as across it, with the same area.
+    pub(crate) fn stretched(self, stretch: f64, direction_rad: f64) -> Self {
+        let (sin, cos) = (libm::sin(direction_rad), libm::cos(direction_rad));
+        // AᵀA for the matrix A of the stretch, and its Cholesky factor. The determinant of A is 1.
+        let xx = cos * cos / stretch + sin * sin * stretch;
+        let xy = sin * cos * (1.0 / stretch - stretch);
+        let [x, y] = self.step;
+        let across = xx.sqrt();
+        Self { step: [x * across, y / across], shear: x * xy / across, ..self }
     }
 }
 
@@ -163,7 +177,7 @@ impl NoiseField {
 
     /// Writes the field at a row of pixels that starts at `first`, by linear interpolation. `texels` is a buffer.
     pub(crate) fn row_into(&self, row: &mut [f32], sampler: &FieldSampler, first: Point, texels: &mut Texels) {
-        let x = fixed(sampler.origin[0] + first[0] * sampler.step[0]);
+        let x = fixed(sampler.origin[0] + first[0] * sampler.step[0] + first[1] * sampler.shear);
         let y = fixed(sampler.origin[1] + first[1] * sampler.step[1]);
         let step = fixed(sampler.step[0]);
         // The range of texels of the row, from the leftmost, or all of them.
@@ -245,6 +259,22 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_stretched_field_is_longer_along_the_direction_and_shorter_across_it() {
+        let mut rng = Key { seed: 5, index: 0 }.stream("test", 0, "stretch");
+        for (stretch, direction) in [(1.0, 0.3), (2.0, 0.0), (3.0, 1.1), (2.5, -2.0), (4.0, 1.570_796)] {
+            let sampler = FieldSampler::new(4.0, &mut rng).stretched(stretch, direction);
+            let texels = |[x, y]: Point| {
+                let [u, v] = [x * sampler.step[0] + y * sampler.shear, y * sampler.step[1]];
+                4.0 * (u * u + v * v).sqrt()
+            };
+            let (sin, cos) = (libm::sin(direction), libm::cos(direction));
+            assert!((texels([cos, sin]) * stretch.sqrt() - 1.0).abs() < 1e-9, "{stretch} {direction}");
+            assert!((texels([-sin, cos]) / stretch.sqrt() - 1.0).abs() < 1e-9, "{stretch} {direction}");
+            assert!(((sampler.step[0] * sampler.step[1]).abs() * 16.0 - 1.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
     fn a_row_matches_bilinear_interpolation_for_any_length() {
         let mut rng = Key { seed: 2, index: 0 }.stream("test", 0, "pools");
         let values: Vec<f32> = (0..SIDE * SIDE).map(|_| random::uniform(&mut rng) as f32).collect();
@@ -252,12 +282,14 @@ mod tests {
         assert!((noise_field.quantile(0.25) - 0.25).abs() < 0.03);
         for (texel_px, times) in [(0.3, 1), (1.0, 4), (1.17, 1), (4.0, 1)] {
             for length in [1, 2, 60, 511, 512, 1400].repeat(times) {
-                let sampler = FieldSampler::new(texel_px, &mut rng);
+                let whole = FieldSampler::new(texel_px, &mut rng);
+                let sampler = if length == 60 { whole.stretched(2.5, 0.7) } else { whole };
                 let mut row = vec![0.0; length];
                 noise_field.row_into(&mut row, &sampler, [3.0, 5.0], &mut [0.0; SIDE + 1]);
                 for (i, value) in row.iter().enumerate() {
                     let place = [3.0 + i as f64, 5.0];
                     let [x, y] = [0, 1].map(|axis| sampler.origin[axis] + place[axis] * sampler.step[axis]);
+                    let x = x + place[1] * sampler.shear;
                     let texel = |x: f64, y: f64| {
                         let [x, y] = [x, y].map(|c| c.rem_euclid(SIDE as f64) as usize);
                         f64::from(values[y * SIDE + x])

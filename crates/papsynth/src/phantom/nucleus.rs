@@ -32,6 +32,9 @@ const WRINKLES: core::ops::RangeInclusive<u32> = 3..=7;
 /// Amplitude of the strongest wrinkles, relative to the radius.
 const WRINKLE: f64 = 0.075;
 
+/// Roundness of the notches of wrinkles: 0 gives corners.
+const NOTCH: f64 = 0.2;
+
 /// Irregularity of the outline of a pyknotic nucleus: standard deviation of the second harmonic.
 const PYKNOTIC: f64 = 0.05;
 
@@ -177,7 +180,7 @@ fn add_nucleolus(absorbance: &mut Tile, outline: &[Point], centre: Point, cell: 
     }
 }
 
-/// Displaces the points of an outline radially by harmonics of random phase, with notches of sharp corners.
+/// Displaces the points of an outline radially by harmonics of random phase, with notches.
 fn wrinkle(outline: &mut [Point], strength: f64, rng: &mut Stream) {
     let radius = (area(outline) / core::f64::consts::PI).sqrt();
     let waves: Vec<[f64; 3]> = WRINKLES
@@ -189,9 +192,12 @@ fn wrinkle(outline: &mut [Point], strength: f64, rng: &mut Stream) {
     for point in outline.iter_mut() {
         let angle = libm::atan2(point[1], point[0]);
         let length = (point[0] * point[0] + point[1] * point[1]).sqrt();
-        // The absolute value gives sharp notches and round bulges, as in a wrinkled membrane.
-        let push: f64 =
-            waves.iter().map(|[h, a, phase]| -a.abs() * (libm::cos(h * angle + phase)).abs() + 0.6 * a.abs()).sum();
+        // Round bulges with narrow notches between them, as in a wrinkled membrane. The mean of |cos| is 0.64.
+        let bulge = |[h, a, phase]: &[f64; 3]| {
+            let cos = libm::cos(h * angle + phase);
+            a.abs() * ((cos * cos + NOTCH * NOTCH).sqrt() - 0.64)
+        };
+        let push: f64 = waves.iter().map(bulge).sum();
         let scale = ((length + push) / length.max(1e-9)).clamp(0.5, 1.5);
         point[0] *= scale;
         point[1] *= scale;

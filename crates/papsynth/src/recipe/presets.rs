@@ -78,7 +78,7 @@ impl Preset {
 
 impl Recipe {
     /// Returns the same slide as an EDF image of a scanner: with the focus, blur, softness of edges, noise, texture and
-    /// staining strength of [`Preset::ExtendedFocus`].
+    /// staining strength of [`Preset::ExtendedFocus`], and as few defocused objects.
     #[must_use]
     pub fn fused(mut self) -> Self {
         let like = Preset::ExtendedFocus.recipe();
@@ -91,9 +91,11 @@ impl Recipe {
                 $(self.$section.$number = like.$section.$number;)*
             };
         }
-        take!(nucleus.edge_um, nucleus.clumping, cytoplasm.rim_um);
+        take!(nucleus.edge_um, nucleus.clumping, nucleus.thickness_gradient, cytoplasm.rim_um);
         take!(camera.prnu, camera.full_well_e, camera.glare_subtracted, camera.read_noise_e, camera.sensor_dust);
         take!(stain.slide_cytoplasm, stain.slide_nucleus, stain.field_texture);
+        // Few objects lie beyond all planes of a fused image.
+        self.debris.out_of_focus = like.debris.out_of_focus;
         self
     }
 }

@@ -285,12 +285,12 @@ section! {
         /// Number of protrusions of the rim.
         protrusions: Number (given usize) = Number::log_normal(1.5, 0.9).at_most(9.0), 0..=20;
         /// Number of wrinkles: ridges and pleats. A fifth of them are rolled stretches of the rim.
-        wrinkles: Number (given usize) = Number::log_normal(10.0, 0.6).at_most(60.0), 0..=100;
+        wrinkles: Number (given usize) = Number::log_normal(13.0, 0.6).at_most(60.0), 0..=100;
         /// Additional thickness at the crest of a wrinkle, relative to the flat sheet. Rolled stretches of the rim have
         /// 0.4 to 1.6 times this thickness.
-        wrinkle_thickness: Number (given f64) = Number::log_normal(0.2, 0.42), 0..=5;
+        wrinkle_thickness: Number (given f64) = Number::log_normal(0.2, 0.55).at_most(0.6), 0..=5;
         /// Width of a wrinkle: standard deviation of its profile. Rolled stretches of the rim have 0.4 to 0.9 µm.
-        wrinkle_um: Number (given f64) = Number::uniform(0.3, 1.3), 0.05..=5, "µm";
+        wrinkle_um: Number (given f64) = Number::uniform(0.25, 1.0), 0.05..=5, "µm";
         /// Additional density and granularity of the cytoplasm around the nucleus, relative to the rest.
         endoplasm: Number (given f64) = Number::log_normal(0.13, 0.5), 0..=2;
         /// Amplitude of the first level of detail, low-frequency noise, relative to the absorbance of the cytoplasm.

@@ -1,5 +1,7 @@
 //! Detail of cytoplasm: clouds, flecks, fine texture, cytoskeleton, degeneration, endoplasm.
 
+use core::ops::Range;
+
 use multiversion::multiversion;
 use voronoi_cytoskeleton::{LineParams, draw_into};
 
@@ -23,14 +25,12 @@ pub(super) fn add_detail(
     rng: &mut Stream,
 ) -> Result<(), ErrorKind> {
     let (detail, noise_fields, pixel_um) = (&cell.body.detail, cell.noise_fields, cell.pixel_um());
-    let clouds = FieldSampler::clouds(detail.clouds_um / pixel_um, rng);
+    let mut clouds = Clouds::new(absorbance, cell, rng);
     let flecks = FieldSampler::fine(pixel_um, rng);
     let mut texture = FineTexture::new(cell, inner)?;
     let (cloud, fleck) = (detail.clouds as f32, detail.flecks as f32);
     let threshold = if fleck > 0.0 { noise_fields.flecks().quantile(detail.flecks_threshold) } else { 0.0 };
     let width = absorbance.width;
-    let slow = cloud > 0.0 && detail.clouds_um / pixel_um >= SMOOTH_PX;
-    let mut slow_clouds = slow.then(|| CoarseTile::noise(absorbance, noise_fields.clouds(), &clouds));
     let mut fields = [(); 3].map(|()| vec![0.0_f32; width]);
     let mut texels: Texels = [0.0; SIDE + 1];
     let rows = absorbance.values.chunks_exact_mut(width).zip(coverage.values.chunks_exact(width));
@@ -38,10 +38,8 @@ pub(super) fn add_detail(
         let Some((first, end)) = covered(cover) else { continue };
         let at = [first as f64, y as f64];
         let [of_clouds, of_flecks, of_texture] = &mut fields;
-        match &mut slow_clouds {
-            Some(slow) => slow.row_into(of_clouds, y),
-            None if cloud > 0.0 => noise_fields.clouds().row_into(&mut of_clouds[first..end], &clouds, at, &mut texels),
-            None => {}
+        if cloud > 0.0 {
+            clouds.row_into(of_clouds, first..end, y, &mut texels);
         }
         if fleck > 0.0 {
             noise_fields.flecks().row_into(&mut of_flecks[first..end], &flecks, at, &mut texels);
@@ -61,6 +59,60 @@ const SMOOTH_PX: f64 = 3.0 * COARSE as f64;
 
 /// Thickness for which the strength of the texture was measured, relative to the flat sheet.
 const TEXTURE_THICKNESS: f32 = 1.3;
+
+/// Length of clouds relative to their width: mean and standard deviation of its logarithm, and maximum. Cytoplasm of
+/// real cells has streaks and folds that cross rather than round clouds. This and the next numbers were set by eye.
+const CLOUDS_STRETCH: [f64; 3] = [0.7, 0.5, 4.0];
+
+/// Sizes of the two clouds of a cell, relative to the mean.
+const CLOUDS_SIZES: [f64; 2] = [1.2, 0.7];
+
+/// The clouds of a cell: the sum of two noise fields, each stretched in a direction of its own, with variance 1.
+struct Clouds<'a> {
+    noise_field: &'a NoiseField,
+    samplers: [FieldSampler; 2],
+    /// Wide clouds, drawn with coarse pixels.
+    wide: [Option<CoarseTile>; 2],
+    second: Vec<f32>,
+}
+
+impl<'a> Clouds<'a> {
+    fn new(like: &Tile, cell: &CellContext<'a>, rng: &mut Stream) -> Self {
+        let noise_field = cell.noise_fields.clouds();
+        let drawn = CLOUDS_SIZES.map(|size| {
+            let [mean, sd, greatest] = CLOUDS_STRETCH;
+            let sigma_px = size * cell.body.detail.clouds_um / cell.pixel_um();
+            let stretch = libm::exp(mean + sd * random::normal(rng)).clamp(1.0, greatest);
+            let sampler = FieldSampler::clouds(sigma_px, rng).stretched(stretch, random::direction(rng));
+            let wide = sigma_px / stretch.sqrt() >= SMOOTH_PX;
+            (sampler, wide.then(|| CoarseTile::noise(like, noise_field, &sampler)))
+        });
+        let [(first, wide_first), (second, wide_second)] = drawn;
+        let second_row = vec![0.0; like.width];
+        Self { noise_field, samplers: [first, second], wide: [wide_first, wide_second], second: second_row }
+    }
+
+    /// Writes columns of row `y` of the tile.
+    fn row_into(&mut self, row: &mut [f32], columns: Range<usize>, y: usize, texels: &mut Texels) {
+        let Self { noise_field, samplers, wide, second } = self;
+        let at = [columns.start as f64, y as f64];
+        for ((row, sampler), wide) in [&mut *row, second].into_iter().zip(samplers).zip(wide) {
+            match wide {
+                Some(wide) => wide.row_into(row, y),
+                None => noise_field.row_into(&mut row[columns.clone()], sampler, at, texels),
+            }
+        }
+        add_clouds(&mut row[columns.clone()], &second[columns]);
+    }
+}
+
+/// Adds two independent rows and keeps their variance.
+#[multiversion(targets = "simd")]
+fn add_clouds(row: &mut [f32], other: &[f32]) {
+    for (value, other) in row.iter_mut().zip(other) {
+        *value = core::f32::consts::FRAC_1_SQRT_2 * (*value + other);
+    }
+}
 
 /// Weight of the square of the clouds: dark places are smaller and stronger than pale ones. With it, the skewness of
 /// band-pass responses inside cells is about that of real fields.

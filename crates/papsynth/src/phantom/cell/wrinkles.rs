@@ -157,7 +157,7 @@ fn at_steps(path: &[Point], step: f64) -> Vec<Point> {
 
 /// Draws random factors with a mean of about 1 and a correlation length of a few micrometres; some are 0.
 fn random_factors(count: usize, rng: &mut Stream) -> Vec<f64> {
-    let mut noise = Autoregression::new(0.45, rng);
+    let mut noise = Autoregression::new(0.35, rng);
     (0..count).map(|_| (0.9 + noise.next(rng)).clamp(0.0, 2.5)).collect()
 }
 
@@ -165,7 +165,7 @@ fn random_factors(count: usize, rng: &mut Stream) -> Vec<f64> {
 /// outline at equal steps.
 fn along_rim(outline: &[Point], fine: &[Point], inset: f64, drift: f64, rng: &mut Stream) -> Vec<Point> {
     let middle = fsd_shape::centroid(outline);
-    let length = random::count(fine.len() as f64 * random::between(0.06, 0.35, rng)).max(4);
+    let length = random::count(fine.len() as f64 * random::between(0.06, 0.45, rng)).max(4);
     let first = random::below(fine.len(), rng);
     let mut noise = Autoregression::new(0.022, rng);
     (0..length)
