@@ -1,16 +1,19 @@
 """Trains a small U-Net to find nuclei, and tests it on real fields.
 
-    nucleus_net.py --train SET [SET ...] --test FOLDER --out RESULT.json [--mask IMAGE MASK]
-                   [--steps N] [--seed N] [--weights FILE]
+    nucleus_net.py --train SET [SET ...] --test FOLDER --out RESULT.json [--unlabelled FOLDER]
+                   [--mask IMAGE MASK] [--steps N] [--seed N] [--weights FILE]
 
 A SET is a data set of `papsynth generate`, or a folder of data sets, of which the masks of nuclei are learned, or a
 folder of PNG and CSV files with the centres of nuclei (y, x), of which discs are learned. SET:N uses N fields, evenly
 spread over its files. Each batch has equally many crops of all SETs; the last 60 % of the steps use the last SET
 alone, so that a network that learns from synthetic and real fields ends with real ones. In data sets, a part of the
-crops show objects that look like nuclei, and their pixels count as much as those of nuclei. FOLDER holds real fields
-with centres and frames.csv with their grades. A nucleus is found if a detection lies within 12 pixels (4 µm). Writes
-the numbers of found, detected and annotated nuclei of every field, and the Dice coefficient of a mask at several
-scales, as JSON.
+crops show objects that look like nuclei, and their pixels count as much as those of nuclei. Leukocytes on cells do not
+count: many cannot be told from nuclei. With --unlabelled, the network labels the PNG files of a folder itself after
+half of the steps, and learns from these as well; pixels of which it is not certain do not count.
+
+The test FOLDER holds real fields with centres and frames.csv with their grades. A nucleus is found if a detection lies
+within 12 pixels (4 µm). Detections at the border of the image do not count. Writes the numbers of found, detected and
+annotated nuclei of every field, and the Dice coefficient of a mask at several scales, as JSON.
 """
 
 import argparse
@@ -38,9 +41,13 @@ SCALES = (1.0, 1.2)  # of the image with a mask, whose pixel size is not known
 CHANNELS = 12  # of the first level of the network
 CONTRAST = 4.0  # factor on the images
 LAST = 0.6  # part of the steps in which only the last set is used
-MIMICS = (4, 5)  # first and last semantic class of objects that look like nuclei: shreds and leukocytes
+CYTOPLASM, SHRED, LEUKOCYTE = (1, 2), 4, 5  # semantic classes; shreds and leukocytes look like nuclei
 MIMIC_CROPS = 0.35  # share of the crops that are chosen to show such objects
 NUCLEUS_WEIGHT = 3.0  # of pixels of nuclei, and of objects that look like them
+ON_CELL = 0.5  # share of the surroundings of a leukocyte on a cell that are cytoplasm
+SURROUNDINGS = 3  # width of the surroundings, pixels
+CERTAIN = 0.8  # probability that a fifth of the pixels of a nucleus exceed in a field without labels
+BACKGROUND = 0.2  # probability below which pixels are no nuclei
 
 
 def normalized(image):
@@ -73,8 +80,25 @@ def chosen(files, count):
     return [files[int((number + 0.5) * len(files) / count)] for number in range(count)]
 
 
+def on_cells(classes):
+    """Return the mask of the leukocytes on cells."""
+    found = np.zeros(classes.shape, bool)
+    regions, _ = ndimage.label(classes == LEUKOCYTE)
+    for index, box in enumerate(ndimage.find_objects(regions), 1):
+        box = tuple(slice(max(side.start - SURROUNDINGS, 0), side.stop + SURROUNDINGS) for side in box)
+        own = regions[box] == index
+        around = ndimage.binary_dilation(own, iterations=SURROUNDINGS) & (classes[box] != LEUKOCYTE)
+        if np.isin(classes[box][around], CYTOPLASM).sum() > ON_CELL * around.sum():
+            found[box] |= own
+    return found
+
+
 def load(name):
-    """Return the fields of a set: image, mask of nuclei separated where they touch, mask of what looks like nuclei."""
+    """Return the fields of a set.
+
+    A field has an image and three masks: nuclei, separated where they touch; what looks like nuclei; pixels that do not
+    count.
+    """
     path, _, count = name.partition(":")
     folder, count = Path(path), int(count) if count else None
     sets = [folder] if (folder / "images").is_dir() else sorted(file.parent for file in folder.glob("*/images"))
@@ -82,7 +106,7 @@ def load(name):
         files = chosen(sorted(folder.glob("*.png")), count)
         images = [normalized(Image.open(file)) for file in files]
         masks = [discs(image.shape, centres(file.with_suffix(".csv"))) for image, file in zip(images, files)]
-        return [(image, mask, np.zeros_like(mask)) for image, mask in zip(images, masks)]
+        return [(image, mask, np.zeros_like(mask), np.zeros_like(mask)) for image, mask in zip(images, masks)]
     fields = []
     for file in chosen(sorted(file for one in sets for file in (one / "images").glob("*.png")), count):
         labels, classes = (
@@ -94,8 +118,9 @@ def load(name):
             pair = [np.take(labels, range(s, labels.shape[axis] - 1 + s), axis) for s in (0, 1)]
             touching = (pair[0] != pair[1]) & (pair[0] > 0) & (pair[1] > 0)
             border |= np.pad(touching, [(1, 0) if a == axis else (0, 0) for a in (0, 1)])
-        nuclei, mimics = (labels > 0) & ~border, (classes >= MIMICS[0]) & (classes <= MIMICS[1])
-        fields.append((normalized(Image.open(file)), nuclei.astype(np.float32), mimics.astype(np.float32)))
+        ignored = on_cells(classes)
+        masks = (labels > 0) & ~border, np.isin(classes, (SHRED, LEUKOCYTE)) & ~ignored, ignored & (labels == 0)
+        fields.append((normalized(Image.open(file)), *(mask.astype(np.float32) for mask in masks)))
     return fields
 
 
@@ -138,16 +163,34 @@ def crop(fields, rng):
         if shown[part].sum() > 150 or rng.random() < 0.2:
             break
     turns, mirrored = rng.integers(4), rng.random() < 0.5
-    grey, nuclei, mimics = (np.rot90(values[part][::-1] if mirrored else values[part], turns) for values in field)
+    turned = (np.rot90(values[part][::-1] if mirrored else values[part], turns) for values in field)
+    grey, nuclei, mimics, ignored = turned
     grey = grey * rng.uniform(0.8, 1.25) + rng.uniform(-0.03, 0.03)
     if rng.random() < 0.5:
         grey = ndimage.gaussian_filter(grey, rng.uniform(0.3, 1.2))
-    weight = np.where((nuclei > 0) | (mimics > 0), NUCLEUS_WEIGHT, 1)
+    weight = np.where((nuclei > 0) | (mimics > 0), NUCLEUS_WEIGHT, 1) * (1 - ignored)
     return grey + rng.normal(0, rng.uniform(0, 0.02), grey.shape), nuclei, weight
 
 
-def train(sets, steps, seed):
-    """Return the trained network. Each set gives an equal part of a batch; the last batches are of the last set."""
+def own_labels(net, image):
+    """Return a field whose nuclei are those of which the network is certain."""
+    found = probability(net, image)
+    regions, count = ndimage.label(ndimage.binary_opening(found > THRESHOLD, iterations=2))
+    certain = np.zeros(count + 1, bool)
+    for index in range(1, count + 1):
+        inside = found[regions == index]
+        certain[index] = inside.size >= SMALLEST and np.quantile(inside, 0.8) > CERTAIN
+    nuclei = certain[regions]
+    ignored = ~nuclei & (ndimage.maximum_filter(found, 5) >= BACKGROUND)
+    return image, nuclei.astype(np.float32), np.zeros_like(image), ignored.astype(np.float32)
+
+
+def train(sets, steps, seed, unlabelled=()):
+    """Return the trained network.
+
+    Each set gives an equal part of a batch; the last batches are of the last set. If there are images without labels,
+    the network labels them after half of the steps, and all sets are used until the end.
+    """
     rng = np.random.default_rng(seed)
     tf.keras.utils.set_random_seed(seed)
     net = network()
@@ -157,7 +200,7 @@ def train(sets, steps, seed):
     def step(images, targets, weights):
         with tf.GradientTape() as tape:
             logits = net(images, training=True)
-            found = tf.sigmoid(logits)
+            found = tf.sigmoid(logits) * tf.minimum(weights, 1)
             entropy = tf.reduce_mean(weights * tf.nn.sigmoid_cross_entropy_with_logits(targets, logits))
             overlap = (2 * tf.reduce_sum(found * targets) + 1) / (tf.reduce_sum(found) + tf.reduce_sum(targets) + 1)
             loss = entropy + 1 - overlap
@@ -166,7 +209,9 @@ def train(sets, steps, seed):
 
     losses = []
     for number in range(steps):
-        used = sets if number < steps * (1 - LAST) else sets[-1:]
+        if len(unlabelled) and number == steps // 2:
+            sets = [*sets, [own_labels(net, image) for image in unlabelled]]
+        used = sets if len(unlabelled) or number < steps * (1 - LAST) else sets[-1:]
         crops = [crop(used[k % len(used)], rng) for k in range(BATCH)]
         images, targets, weights = (np.array(values, np.float32)[..., None] for values in zip(*crops))
         losses.append(float(step(images * CONTRAST, targets, weights)))
@@ -235,6 +280,7 @@ def use_bfloat16():
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--train", nargs="+", required=True)
+    parser.add_argument("--unlabelled", type=Path)
     parser.add_argument("--test", type=Path, required=True)
     parser.add_argument("--mask", nargs=2, type=Path)
     parser.add_argument("--steps", type=int, default=3000)
@@ -246,7 +292,9 @@ def main():
     if not all(sets) or any(min(image.shape) < SIDE for fields in sets for image, *_ in fields):
         parser.error(f"each training set needs at least one field, of at least {SIDE} pixels")
     use_bfloat16()
-    net = train(sets, options.steps, options.seed)
+    files = sorted(options.unlabelled.glob("*.png")) if options.unlabelled else []
+    unlabelled = [normalized(Image.open(file)) for file in files]
+    net = train(sets, options.steps, options.seed, unlabelled)
     result = {"train": options.train, "steps": options.steps, "seed": options.seed, "fields": []}
     for row in csv.DictReader((options.test / "frames.csv").open()):
         file = options.test / f"{row['frame']}.png"

@@ -28,10 +28,10 @@ const FOR_TRAINING: [&str; 2] = [
 const WIDEN: &str = "1.5";
 
 /// Version of `nucleus_net.py`: results of another version are kept apart.
-const METHOD: u32 = 2;
+const METHOD: u32 = 3;
 
 /// Presets of the overlapping cells on which networks are trained: name and number of fields.
-const OVERLAP_TRAINING: [(&str, &str); 2] = [("lbc", "300"), ("dense", "80")];
+const OVERLAP_TRAINING: [(&str, &str); 3] = [("lbc", "300"), ("dense", "80"), ("high-grade", "100")];
 
 /// Presets of the overlapping cells on which networks are tested.
 const OVERLAP_TESTS: [(&str, &str); 2] = [("extended-focus", "60"), ("lsil", "40")];
@@ -39,10 +39,10 @@ const OVERLAP_TESTS: [(&str, &str); 2] = [("extended-focus", "60"), ("lsil", "40
 /// Trains a small network on synthetic and on real fields, and tests it on other real fields
 ///
 /// Needs PAPSYNTH_REFERENCE. `papsynth match` fits a recipe to every second real field of each grade; a U-Net is
-/// trained on fields of the three recipes, on those real fields, or on both, and finds the nuclei of the other half.
-/// Then the halves change places. Every training and its weights are written to target/worth, where an interrupted run
-/// continues; a table is printed. Delete target/worth after a change of papsynth. Each training takes seven minutes on
-/// one core; all of them take four hours. docs/WORTH.md tells what was measured.
+/// trained on fields of the three recipes, on those real fields with or without their labels, or on both, and finds the
+/// nuclei of the other half. Then the halves change places. Every training and its weights are written to target/worth,
+/// where an interrupted run continues; a table is printed. Delete target/worth after a change of papsynth. Each
+/// training takes seven minutes on one core; all of them take four hours. docs/WORTH.md tells what was measured.
 ///
 /// With --overlap: trains networks on complete masks of overlapping cells, and tests them on synthetic fields of other
 /// presets. Prints the Dice coefficients of found cells and the share of missed cells. Needs no real fields.
@@ -52,7 +52,7 @@ pub(crate) struct Worth {
     #[arg(long, value_name = "N", default_value_t = 3)]
     seeds: u32,
     /// Steps of a training
-    #[arg(long, value_name = "N", default_value = "3000", default_value_if("overlap", "true", "1600"))]
+    #[arg(long, value_name = "N", default_value = "3000", default_value_if("overlap", "true", "3600"))]
     steps: u32,
     /// Outlines overlapping cells of synthetic fields instead
     #[arg(long, conflicts_with_all = ["widen", "other", "only"])]
@@ -100,8 +100,11 @@ pub(crate) fn run(workspace: &Workspace, options: &Worth) -> Result<()> {
             WIDEN => "synthetic".to_owned(),
             factor => format!("synthetic_widened_{}", factor.replace('.', "_")),
         };
+        let unlabelled = vec![synthetic.clone(), "--unlabelled".to_owned(), real.clone()];
+        // The arguments after `--train` of each row of the table.
         let mut arms = vec![
             (name.clone(), vec![synthetic.clone()]),
+            (format!("{name}_and_unlabelled"), unlabelled),
             ("real".to_owned(), vec![real.clone()]),
             (format!("{name}_and_2_real"), vec![synthetic.clone(), format!("{real}:2")]),
             (format!("{name}_and_4_real"), vec![synthetic.clone(), format!("{real}:4")]),
@@ -109,21 +112,21 @@ pub(crate) fn run(workspace: &Workspace, options: &Worth) -> Result<()> {
         ];
         arms.extend(options.other.iter().map(|(name, folder)| (name.clone(), vec![folder.display().to_string()])));
         for seed in 0..options.seeds {
-            trainings.extend(arms.iter().map(|(arm, sets)| (seed, half, arm.clone(), sets.clone())));
+            trainings.extend(arms.iter().map(|(arm, arguments)| (seed, half, arm.clone(), arguments.clone())));
         }
     }
     // The first seed of everything comes first, so that an interrupted run has a complete table.
     trainings.sort_by_key(|(seed, ..)| *seed);
     trainings.retain(|(_, _, arm, _)| options.only.is_empty() || options.only.contains(arm));
     let count = trainings.len();
-    for (number, (seed, half, arm, sets)) in trainings.into_iter().enumerate() {
+    for (number, (seed, half, arm, arguments)) in trainings.into_iter().enumerate() {
         let result = results.join(format!("{arm}-{half}-{seed}.json"));
         if result.exists() {
             continue;
         }
         println!("training {} of {count}: {arm}, half {}, seed {seed}", number + 1, half + 1);
         let mut command = Command::new(&python);
-        command.arg(workspace.root.join("xtask/python/nucleus_net.py")).arg("--train").args(sets);
+        command.arg(workspace.root.join("xtask/python/nucleus_net.py")).arg("--train").args(arguments);
         command.arg("--test").arg(&halves[1 - half]).arg("--out").arg(&result);
         command.args(["--seed", &seed.to_string(), "--steps", &options.steps.to_string(), "--weights"]);
         command.arg(result.with_extension("weights.h5")).arg("--mask");
