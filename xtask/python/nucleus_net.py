@@ -5,15 +5,15 @@
 
 A SET is a data set of `papsynth generate`, or a folder of data sets, of which the masks of nuclei are learned, or a
 folder of PNG and CSV files with the centres of nuclei (y, x), of which discs are learned. SET:N uses N fields, evenly
-spread over its files. Each batch has equally many crops of all SETs; the last 60 % of the steps use the last SET
-alone, so that a network that learns from synthetic and real fields ends with real ones. In data sets, a part of the
-crops show objects that look like nuclei, and their pixels count as much as those of nuclei. Leukocytes on cells do not
-count: many cannot be told from nuclei. With --unlabelled, the network labels the PNG files of a folder itself after
-half of the steps, and learns from these as well; pixels of which it is not certain do not count.
+spread over its files. Each batch has equally many crops of all SETs; the last 60 % of the steps use the last SET alone,
+so that a network that learns from synthetic and real fields ends with real ones. In data sets, a part of the crops show
+objects that look like nuclei, and their pixels count as much as those of nuclei. With --unlabelled, the network labels
+the PNG files of a folder itself after half of the steps, and then learns from these and all SETs until the end; pixels
+of which it is not certain do not count.
 
 The test FOLDER holds real fields with centres and frames.csv with their grades. A nucleus is found if a detection lies
-within 12 pixels (4 µm). Detections at the border of the image do not count. Writes the numbers of found, detected and
-annotated nuclei of every field, and the Dice coefficient of a mask at several scales, as JSON.
+within 12 pixels (4 µm). Detections at the border of the image count only if they find a nucleus. Writes the numbers of
+found, detected and annotated nuclei of every field, and the Dice coefficient of a mask at several scales, as JSON.
 """
 
 import argparse
@@ -41,11 +41,9 @@ SCALES = (1.0, 1.2)  # of the image with a mask, whose pixel size is not known
 CHANNELS = 12  # of the first level of the network
 CONTRAST = 4.0  # factor on the images
 LAST = 0.6  # part of the steps in which only the last set is used
-CYTOPLASM, SHRED, LEUKOCYTE = (1, 2), 4, 5  # semantic classes; shreds and leukocytes look like nuclei
+MIMICS = (4, 5)  # first and last semantic class of objects that look like nuclei: shreds and leukocytes
 MIMIC_CROPS = 0.35  # share of the crops that are chosen to show such objects
 NUCLEUS_WEIGHT = 3.0  # of pixels of nuclei, and of objects that look like them
-ON_CELL = 0.5  # share of the surroundings of a leukocyte on a cell that are cytoplasm
-SURROUNDINGS = 3  # width of the surroundings, pixels
 CERTAIN = 0.8  # probability that a fifth of the pixels of a nucleus exceed in a field without labels
 BACKGROUND = 0.2  # probability below which pixels are no nuclei
 
@@ -80,19 +78,6 @@ def chosen(files, count):
     return [files[int((number + 0.5) * len(files) / count)] for number in range(count)]
 
 
-def on_cells(classes):
-    """Return the mask of the leukocytes on cells."""
-    found = np.zeros(classes.shape, bool)
-    regions, _ = ndimage.label(classes == LEUKOCYTE)
-    for index, box in enumerate(ndimage.find_objects(regions), 1):
-        box = tuple(slice(max(side.start - SURROUNDINGS, 0), side.stop + SURROUNDINGS) for side in box)
-        own = regions[box] == index
-        around = ndimage.binary_dilation(own, iterations=SURROUNDINGS) & (classes[box] != LEUKOCYTE)
-        if np.isin(classes[box][around], CYTOPLASM).sum() > ON_CELL * around.sum():
-            found[box] |= own
-    return found
-
-
 def load(name):
     """Return the fields of a set.
 
@@ -118,9 +103,9 @@ def load(name):
             pair = [np.take(labels, range(s, labels.shape[axis] - 1 + s), axis) for s in (0, 1)]
             touching = (pair[0] != pair[1]) & (pair[0] > 0) & (pair[1] > 0)
             border |= np.pad(touching, [(1, 0) if a == axis else (0, 0) for a in (0, 1)])
-        ignored = on_cells(classes)
-        masks = (labels > 0) & ~border, np.isin(classes, (SHRED, LEUKOCYTE)) & ~ignored, ignored & (labels == 0)
-        fields.append((normalized(Image.open(file)), *(mask.astype(np.float32) for mask in masks)))
+        nuclei, mimics = (labels > 0) & ~border, (classes >= MIMICS[0]) & (classes <= MIMICS[1])
+        masks = (mask.astype(np.float32) for mask in (nuclei, mimics, np.zeros_like(nuclei)))
+        fields.append((normalized(Image.open(file)), *masks))
     return fields
 
 
@@ -173,7 +158,7 @@ def crop(fields, rng):
 
 
 def own_labels(net, image):
-    """Return a field whose nuclei are those of which the network is certain."""
+    """Return a field whose nuclei are those of which the network is certain; others do not count."""
     found = probability(net, image)
     regions, count = ndimage.label(ndimage.binary_opening(found > THRESHOLD, iterations=2))
     certain = np.zeros(count + 1, bool)
@@ -232,30 +217,44 @@ def probability(net, image):
     return total / 8
 
 
+def at_border(regions):
+    """Return the numbers of the regions at the border of the image."""
+    border = np.unique(np.concatenate([regions[0], regions[-1], regions[:, 0], regions[:, -1]]))
+    return border[border > 0]
+
+
 def away_from_border(mask):
     """Return a mask without its regions at the border of the image."""
     regions, _ = ndimage.label(mask)
-    border = np.concatenate([regions[0], regions[-1], regions[:, 0], regions[:, -1]])
-    return mask & ~np.isin(regions, border[border > 0])
+    return mask & ~np.isin(regions, at_border(regions))
 
 
 def detections(found):
-    """Return the centres of the regions above the threshold, without those at the border of the image."""
-    regions, count = ndimage.label(away_from_border(ndimage.binary_opening(found > THRESHOLD, iterations=2)))
+    """Return the centres of the regions above the threshold, and which of them are at the border of the image."""
+    regions, count = ndimage.label(ndimage.binary_opening(found > THRESHOLD, iterations=2))
     index = np.arange(1, count + 1)
     if count == 0:
-        return np.zeros((0, 2))
-    areas = ndimage.sum_labels(np.ones(regions.shape), regions, index)
-    return np.array(ndimage.center_of_mass(regions > 0, regions, index))[areas >= SMALLEST]
+        return np.zeros((0, 2)), np.zeros(0, bool)
+    large = ndimage.sum_labels(np.ones(regions.shape), regions, index) >= SMALLEST
+    places = np.array(ndimage.center_of_mass(regions > 0, regions, index))
+    return places[large], np.isin(index, at_border(regions))[large]
 
 
-def matches(found, true):
-    """Return the number of nuclei with a detection of their own within reach."""
-    if len(found) == 0 or len(true) == 0:
-        return 0
-    distance = np.hypot(found[:, None, 0] - true[None, :, 0], found[:, None, 1] - true[None, :, 1])
-    rows, columns = linear_sum_assignment(np.where(distance <= REACH, distance, 1e4))
-    return int((distance[rows, columns] <= REACH).sum())
+def matched(found, true):
+    """Return which detections have a nucleus of their own within reach."""
+    result = np.zeros(len(found), bool)
+    if len(found) and len(true):
+        distance = np.hypot(found[:, None, 0] - true[None, :, 0], found[:, None, 1] - true[None, :, 1])
+        rows, columns = linear_sum_assignment(np.where(distance <= REACH, distance, 1e4))
+        result[rows] = distance[rows, columns] <= REACH
+    return result
+
+
+def counts(found, true):
+    """Return the numbers of found nuclei, of detections and of annotated nuclei of a field."""
+    places, border = detections(found)
+    right = matched(places, true)
+    return {"matched": int(right.sum()), "detected": int((right | ~border).sum()), "nuclei": len(true)}
 
 
 def dice(net, image, mask):
@@ -292,15 +291,18 @@ def main():
     if not all(sets) or any(min(image.shape) < SIDE for fields in sets for image, *_ in fields):
         parser.error(f"each training set needs at least one field, of at least {SIDE} pixels")
     use_bfloat16()
-    files = sorted(options.unlabelled.glob("*.png")) if options.unlabelled else []
-    unlabelled = [normalized(Image.open(file)) for file in files]
+    unlabelled = []
+    if options.unlabelled:
+        unlabelled = [normalized(Image.open(file)) for file in sorted(options.unlabelled.glob("*.png"))]
+        if not unlabelled or any(min(image.shape) < SIDE for image in unlabelled):
+            parser.error(f"{options.unlabelled} needs at least one PNG file, of at least {SIDE} pixels")
     net = train(sets, options.steps, options.seed, unlabelled)
-    result = {"train": options.train, "steps": options.steps, "seed": options.seed, "fields": []}
+    arguments = {"train": options.train, "unlabelled": options.unlabelled and str(options.unlabelled)}
+    result = {**arguments, "steps": options.steps, "seed": options.seed, "fields": []}
     for row in csv.DictReader((options.test / "frames.csv").open()):
         file = options.test / f"{row['frame']}.png"
-        found, true = detections(probability(net, normalized(Image.open(file)))), centres(file.with_suffix(".csv"))
-        counts = {"matched": matches(found, true), "detected": len(found), "nuclei": len(true)}
-        result["fields"].append({"frame": row["frame"], "grade": row["grade"].strip(), **counts})
+        found = counts(probability(net, normalized(Image.open(file))), centres(file.with_suffix(".csv")))
+        result["fields"].append({"frame": row["frame"], "grade": row["grade"].strip(), **found})
     if options.mask:
         image, mask = (Image.open(file) for file in options.mask)
         mask = np.asarray(mask)

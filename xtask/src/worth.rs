@@ -30,11 +30,15 @@ const WIDEN: &str = "1.5";
 /// Version of `nucleus_net.py`: results of another version are kept apart.
 const METHOD: u32 = 3;
 
-/// Presets of the overlapping cells on which networks are trained: name and number of fields.
-const OVERLAP_TRAINING: [(&str, &str); 3] = [("lbc", "300"), ("dense", "80"), ("high-grade", "100")];
+/// Version of `overlap_net.py` and of its sets: results of another version are kept apart.
+const OVERLAP_METHOD: u32 = 2;
+
+/// Presets of the overlapping cells on which networks are trained: name, number of fields and seed.
+const OVERLAP_TRAINING: [(&str, &str, &str); 3] =
+    [("lbc", "300", "1"), ("dense", "80", "2"), ("high-grade", "100", "3")];
 
 /// Presets of the overlapping cells on which networks are tested.
-const OVERLAP_TESTS: [(&str, &str); 2] = [("extended-focus", "60"), ("lsil", "40")];
+const OVERLAP_TESTS: [(&str, &str, &str); 2] = [("extended-focus", "60", "4"), ("lsil", "40", "5")];
 
 /// Trains a small network on synthetic and on real fields, and tests it on other real fields
 ///
@@ -144,13 +148,11 @@ pub(crate) fn run(workspace: &Workspace, options: &Worth) -> Result<()> {
 fn overlap(workspace: &Workspace, options: &Worth) -> Result<()> {
     let python = python::environment(workspace, "worth", PACKAGES)?;
     let folder = workspace.target.join("worth/overlap");
-    let results = folder.join(format!("results-{}-steps", options.steps));
+    let results = folder.join(format!("results-{OVERLAP_METHOD}-{}-steps", options.steps));
     shell::make(&results)?;
-    let mut seed = 0;
-    for (preset, frames) in OVERLAP_TRAINING.into_iter().chain(OVERLAP_TESTS) {
-        seed += 1;
+    for (preset, frames, seed) in OVERLAP_TRAINING.into_iter().chain(OVERLAP_TESTS) {
         let mut generate = program(workspace);
-        generate.args(["generate", "--preset", preset, "--frames", frames, "--seed", &seed.to_string(), "--out"]);
+        generate.args(["generate", "--preset", preset, "--frames", frames, "--seed", seed, "--out"]);
         generate.arg(folder.join(preset)).args(["--set", "slide.fields_per_slide=1"]);
         shell::run(generate.args(["--without", "noise-free,layers,labels,contact-sheet"]))?;
     }
@@ -162,8 +164,8 @@ fn overlap(workspace: &Workspace, options: &Worth) -> Result<()> {
         println!("training {} of {}", seed + 1, options.seeds);
         let mut command = Command::new(&python);
         command.arg(workspace.root.join("xtask/python/overlap_net.py"));
-        command.arg("--train").args(OVERLAP_TRAINING.map(|(preset, _)| folder.join(preset)));
-        command.arg("--test").args(OVERLAP_TESTS.map(|(preset, _)| folder.join(preset)));
+        command.arg("--train").args(OVERLAP_TRAINING.map(|(preset, ..)| folder.join(preset)));
+        command.arg("--test").args(OVERLAP_TESTS.map(|(preset, ..)| folder.join(preset)));
         command.args(["--seed", &seed.to_string(), "--steps", &options.steps.to_string(), "--out"]);
         shell::run(command.arg(&result).arg("--weights").arg(result.with_extension("")))?;
     }

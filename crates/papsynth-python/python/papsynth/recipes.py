@@ -466,7 +466,7 @@ class Cytoplasm(Section):
     """Number of protrusions of the rim. From 0 to 20."""
 
     wrinkles: Number | None = None
-    """Number of wrinkles: ridges and pleats. A fifth of them are rolled stretches of the rim. From 0 to 100."""
+    """Number of wrinkles: ridges and pleats. An eighth of them are rolled stretches of the rim. From 0 to 100."""
 
     wrinkle_thickness: Number | None = None
     """Additional thickness at the crest of a wrinkle, relative to the flat sheet. Rolled stretches of the rim have 0.4
@@ -487,7 +487,12 @@ class Cytoplasm(Section):
     """
 
     clouds_um: Number | None = None
-    """Standard deviation of the smoothing of that noise. From 0.1 to 100 µm."""
+    """Standard deviation of the smoothing of that noise: two noise fields with 1.2 and 0.7 times this number, each
+    stretched in a direction of its own. From 0.1 to 100 µm.
+    """
+
+    clouds_stretch: Number | None = None
+    """Length of the clouds relative to their width, with the same area; 1 for round clouds. From 1 to 20."""
 
     flecks: Number | None = None
     """Amplitude of the second level of detail, relative to the absorbance of the cytoplasm: spots, made by thresholding
@@ -1101,7 +1106,7 @@ class Nucleus(Section):
     """Probability that a nucleus is pyknotic: small, dark, without structure. From 0 to 1."""
 
     wrinkled: Number | None = None
-    """Probability that a nucleus is wrinkled or angular. From 0 to 1."""
+    """Probability that a nucleus is wrinkled: round bulges with narrow notches between them. From 0 to 1."""
 
     rim: Number | None = None
     """Absorbance of the rim (the nuclear membrane) relative to the nucleus. From 0 to 2."""

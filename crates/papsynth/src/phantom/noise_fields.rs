@@ -55,7 +55,7 @@ pub(crate) type Texels = [f32; SIDE + 1];
 /// The position, mirroring and stretch at which one object samples a noise field.
 ///
 /// Sampling follows the rows of the field, so a row of pixels needs only two rows of texels. The fields are isotropic,
-/// so no rotation is needed: a stretch in any direction is a rotation of the field, which changes nothing, and an upper
+/// so no rotation is needed: a stretch in any direction is a rotation of the field, which changes no statistics, and an upper
 /// triangular matrix, which keeps its rows.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FieldSampler {
@@ -133,8 +133,9 @@ impl FieldSampler {
         let xx = cos * cos / stretch + sin * sin * stretch;
         let xy = sin * cos * (1.0 / stretch - stretch);
         let [x, y] = self.step;
-        let across = xx.sqrt();
-        Self { step: [x * across, y / across], shear: x * xy / across, ..self }
+        debug_assert!(self.shear == 0.0 && stretch > 0.0, "{stretch}");
+        let x_scale = xx.sqrt();
+        Self { step: [x * x_scale, y / x_scale], shear: x * xy / x_scale, ..self }
     }
 }
 

@@ -33,7 +33,10 @@ const WRINKLES: core::ops::RangeInclusive<u32> = 3..=7;
 const WRINKLE: f64 = 0.075;
 
 /// Roundness of the notches of wrinkles: 0 gives corners.
-const NOTCH: f64 = 0.2;
+const NOTCH_ROUNDNESS: f64 = 0.3;
+
+/// Mean over all angles of √(cos² + r²) with this roundness r, so that wrinkles keep the mean radius.
+const MEAN_BULGE: f64 = 0.7246;
 
 /// Irregularity of the outline of a pyknotic nucleus: standard deviation of the second harmonic.
 const PYKNOTIC: f64 = 0.05;
@@ -192,14 +195,46 @@ fn wrinkle(outline: &mut [Point], strength: f64, rng: &mut Stream) {
     for point in outline.iter_mut() {
         let angle = libm::atan2(point[1], point[0]);
         let length = (point[0] * point[0] + point[1] * point[1]).sqrt();
-        // Round bulges with narrow notches between them, as in a wrinkled membrane. The mean of |cos| is 0.64.
+        // Round bulges with narrow notches between them, as in a wrinkled membrane.
         let bulge = |[h, a, phase]: &[f64; 3]| {
             let cos = libm::cos(h * angle + phase);
-            a.abs() * ((cos * cos + NOTCH * NOTCH).sqrt() - 0.64)
+            a.abs() * ((cos * cos + NOTCH_ROUNDNESS * NOTCH_ROUNDNESS).sqrt() - MEAN_BULGE)
         };
         let push: f64 = waves.iter().map(bulge).sum();
         let scale = ((length + push) / length.max(1e-9)).clamp(0.5, 1.5);
         point[0] *= scale;
         point[1] *= scale;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::key::Key;
+
+    #[test]
+    fn wrinkles_are_round_bulges_with_notches_and_keep_the_area() {
+        let rng = &mut Key { seed: 7, index: 0 }.stream("test", 0, "wrinkles");
+        let (mut areas, mut squares, mut cubes) = (0.0, 0.0, 0.0);
+        const COUNT: usize = 500;
+        for _ in 0..COUNT {
+            let angles = (0..POINTS).map(|k| core::f64::consts::TAU * k as f64 / POINTS as f64);
+            let mut outline: Vec<Point> = angles.map(|a| [10.0 * libm::cos(a), 10.0 * libm::sin(a)]).collect();
+            wrinkle(&mut outline, WRINKLE, rng);
+            areas += area(&outline) / (core::f64::consts::PI * 100.0);
+            let at = |k: usize| outline[k % POINTS];
+            let side = |k: usize| [at(k + 1)[0] - at(k)[0], at(k + 1)[1] - at(k)[1]];
+            for k in 0..POINTS {
+                let ([ax, ay], [bx, by]) = (side(k), side(k + 1));
+                // Mean turn: a full turn over all points. Notches turn inwards, by more than bulges turn outwards.
+                let turn = libm::atan2(ax * by - ay * bx, ax * bx + ay * by) - core::f64::consts::TAU / POINTS as f64;
+                squares += turn * turn;
+                cubes += turn * turn * turn;
+            }
+        }
+        let count = (COUNT * POINTS) as f64;
+        let skewness = (cubes / count) / (squares / count).powf(1.5);
+        assert!(skewness < -0.3, "{skewness}");
+        assert!((areas / COUNT as f64 - 1.0).abs() < 0.02, "{areas}");
     }
 }

@@ -78,7 +78,7 @@ impl Preset {
 
 impl Recipe {
     /// Returns the same slide as an EDF image of a scanner: with the focus, blur, softness of edges, noise, texture and
-    /// staining strength of [`Preset::ExtendedFocus`], and as few defocused objects.
+    /// staining strength of [`Preset::ExtendedFocus`], its nuclei of even thickness, and no objects out of focus.
     #[must_use]
     pub fn fused(mut self) -> Self {
         let like = Preset::ExtendedFocus.recipe();
@@ -94,8 +94,7 @@ impl Recipe {
         take!(nucleus.edge_um, nucleus.clumping, nucleus.thickness_gradient, cytoplasm.rim_um);
         take!(camera.prnu, camera.full_well_e, camera.glare_subtracted, camera.read_noise_e, camera.sensor_dust);
         take!(stain.slide_cytoplasm, stain.slide_nucleus, stain.field_texture);
-        // Few objects lie beyond all planes of a fused image.
-        self.debris.out_of_focus = like.debris.out_of_focus;
+        self.debris.out_of_focus.count = like.debris.out_of_focus.count;
         self
     }
 }
@@ -120,6 +119,17 @@ mod tests {
             assert_eq!(Preset::by_name(preset.name()), Some(preset));
         }
         assert_eq!(Preset::Lbc.recipe(), Recipe::default());
+    }
+
+    #[test]
+    fn a_fused_recipe_has_the_focus_and_nuclei_of_extended_focus_and_keeps_its_cells() {
+        let (like, own) = (Preset::ExtendedFocus.recipe(), Preset::Lsil.recipe());
+        let fused = own.clone().fused();
+        assert!(fused.problems().is_empty(), "{:?}", fused.problems());
+        assert_eq!((fused.focus.output, &fused.focus.planes), (like.focus.output, &like.focus.planes));
+        assert_eq!(fused.nucleus.thickness_gradient, like.nucleus.thickness_gradient);
+        assert_eq!(fused.debris.out_of_focus.count, like.debris.out_of_focus.count);
+        assert_eq!((&fused.cells, &fused.debris.leukocytes), (&own.cells, &own.debris.leukocytes));
     }
 
     #[test]

@@ -284,7 +284,7 @@ section! {
         notches: Number (given usize) = Number::log_normal(2.5, 0.9).at_most(14.0), 0..=20;
         /// Number of protrusions of the rim.
         protrusions: Number (given usize) = Number::log_normal(1.5, 0.9).at_most(9.0), 0..=20;
-        /// Number of wrinkles: ridges and pleats. A fifth of them are rolled stretches of the rim.
+        /// Number of wrinkles: ridges and pleats. An eighth of them are rolled stretches of the rim.
         wrinkles: Number (given usize) = Number::log_normal(13.0, 0.6).at_most(60.0), 0..=100;
         /// Additional thickness at the crest of a wrinkle, relative to the flat sheet. Rolled stretches of the rim have
         /// 0.4 to 1.6 times this thickness.
@@ -296,8 +296,11 @@ section! {
         /// Amplitude of the first level of detail, low-frequency noise, relative to the absorbance of the cytoplasm.
         /// Dark places are smaller and stronger than pale ones.
         clouds: Number = Number::uniform(0.06, 0.22), 0..=2;
-        /// Standard deviation of the smoothing of that noise.
+        /// Standard deviation of the smoothing of that noise: two noise fields with 1.2 and 0.7 times this number, each
+        /// stretched in a direction of its own.
         clouds_um: Number = Number::log_normal(4.0, 0.7).at_least(0.7).at_most(14.0), 0.1..=100, "µm";
+        /// Length of the clouds relative to their width, with the same area; 1 for round clouds.
+        clouds_stretch: Number = Number::log_normal(2.0, 0.5).at_least(1.0).at_most(4.0), 1..=20;
         /// Amplitude of the second level of detail, relative to the absorbance of the cytoplasm: spots, made by
         /// thresholding Brownian noise.
         flecks: Number = Number::log_normal(0.02, 0.5).at_least(0.0).at_most(0.5), 0..=5;
@@ -404,7 +407,7 @@ section! {
         restore_feather_um: Number = 0.3, 0..=5, "µm";
         /// Probability that a nucleus is pyknotic: small, dark, without structure.
         pyknotic: Number = 0.05, 0..=1;
-        /// Probability that a nucleus is wrinkled or angular.
+        /// Probability that a nucleus is wrinkled: round bulges with narrow notches between them.
         wrinkled: Number = 0.15, 0..=1;
         /// Absorbance of the rim (the nuclear membrane) relative to the nucleus.
         rim: Number = Number::uniform(0.0, 0.2), 0..=2;

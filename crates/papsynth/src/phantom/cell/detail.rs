@@ -38,7 +38,7 @@ pub(super) fn add_detail(
         let Some((first, end)) = covered(cover) else { continue };
         let at = [first as f64, y as f64];
         let [of_clouds, of_flecks, of_texture] = &mut fields;
-        if cloud > 0.0 {
+        if let Some(clouds) = &mut clouds {
             clouds.row_into(of_clouds, first..end, y, &mut texels);
         }
         if fleck > 0.0 {
@@ -60,49 +60,51 @@ const SMOOTH_PX: f64 = 3.0 * COARSE as f64;
 /// Thickness for which the strength of the texture was measured, relative to the flat sheet.
 const TEXTURE_THICKNESS: f32 = 1.3;
 
-/// Length of clouds relative to their width: mean and standard deviation of its logarithm, and maximum. Cytoplasm of
-/// real cells has streaks and folds that cross rather than round clouds. This and the next numbers were set by eye.
-const CLOUDS_STRETCH: [f64; 3] = [0.7, 0.5, 4.0];
-
-/// Sizes of the two clouds of a cell, relative to the mean.
+/// Sizes of the two noise fields of clouds, relative to `clouds_um`. Set by eye.
 const CLOUDS_SIZES: [f64; 2] = [1.2, 0.7];
 
 /// The clouds of a cell: the sum of two noise fields, each stretched in a direction of its own, with variance 1.
+/// Cytoplasm of real cells has strands and folds that cross rather than round clouds.
 struct Clouds<'a> {
     noise_field: &'a NoiseField,
     samplers: [FieldSampler; 2],
     /// Wide clouds, drawn with coarse pixels.
     wide: [Option<CoarseTile>; 2],
-    second: Vec<f32>,
+    /// A row of the second noise field.
+    second_row: Vec<f32>,
 }
 
 impl<'a> Clouds<'a> {
-    fn new(like: &Tile, cell: &CellContext<'a>, rng: &mut Stream) -> Self {
-        let noise_field = cell.noise_fields.clouds();
-        let drawn = CLOUDS_SIZES.map(|size| {
-            let [mean, sd, greatest] = CLOUDS_STRETCH;
-            let sigma_px = size * cell.body.detail.clouds_um / cell.pixel_um();
-            let stretch = libm::exp(mean + sd * random::normal(rng)).clamp(1.0, greatest);
-            let sampler = FieldSampler::clouds(sigma_px, rng).stretched(stretch, random::direction(rng));
-            let wide = sigma_px / stretch.sqrt() >= SMOOTH_PX;
-            (sampler, wide.then(|| CoarseTile::noise(like, noise_field, &sampler)))
+    /// Returns none for a cell without clouds.
+    fn new(like: &Tile, cell: &CellContext<'a>, rng: &mut Stream) -> Option<Self> {
+        let detail = &cell.body.detail;
+        let sizes = CLOUDS_SIZES.map(|size| size * detail.clouds_um / cell.pixel_um());
+        let samplers = sizes.map(|sigma_px| {
+            FieldSampler::clouds(sigma_px, rng).stretched(detail.clouds_stretch, random::direction(rng))
         });
-        let [(first, wide_first), (second, wide_second)] = drawn;
-        let second_row = vec![0.0; like.width];
-        Self { noise_field, samplers: [first, second], wide: [wide_first, wide_second], second: second_row }
+        if detail.clouds <= 0.0 {
+            return None;
+        }
+        let noise_field = cell.noise_fields.clouds();
+        let mut wide = [None, None];
+        for ((wide, sampler), sigma_px) in wide.iter_mut().zip(&samplers).zip(sizes) {
+            let is_wide = sigma_px / detail.clouds_stretch.sqrt() >= SMOOTH_PX;
+            *wide = is_wide.then(|| CoarseTile::noise(like, noise_field, sampler));
+        }
+        Some(Self { noise_field, samplers, wide, second_row: vec![0.0; like.width] })
     }
 
     /// Writes columns of row `y` of the tile.
     fn row_into(&mut self, row: &mut [f32], columns: Range<usize>, y: usize, texels: &mut Texels) {
-        let Self { noise_field, samplers, wide, second } = self;
+        let Self { noise_field, samplers, wide, second_row } = self;
         let at = [columns.start as f64, y as f64];
-        for ((row, sampler), wide) in [&mut *row, second].into_iter().zip(samplers).zip(wide) {
+        for ((row, sampler), wide) in [&mut *row, second_row].into_iter().zip(samplers).zip(wide) {
             match wide {
                 Some(wide) => wide.row_into(row, y),
                 None => noise_field.row_into(&mut row[columns.clone()], sampler, at, texels),
             }
         }
-        add_clouds(&mut row[columns.clone()], &second[columns]);
+        add_clouds(&mut row[columns.clone()], &second_row[columns]);
     }
 }
 
@@ -508,13 +510,37 @@ mod tests {
     }
 
     #[test]
+    fn the_sum_of_two_rows_of_clouds_has_the_variance_of_each() {
+        let generator = NoiseFieldGenerator::new();
+        let noise_fields = generator.fields(Key { seed: 6, index: 0 });
+        let mut rng = Key { seed: 6, index: 0 }.stream("test", 0, "clouds");
+        let [mut one, mut squares, mut count] = [0.0, 0.0, 0.0];
+        for _ in 0..400 {
+            let mut rows = [(); 2].map(|()| {
+                let sampler = FieldSampler::clouds(2.0, &mut rng).stretched(2.5, random::direction(&mut rng));
+                let mut row = vec![0.0_f32; 300];
+                noise_fields.clouds().row_into(&mut row, &sampler, [0.0; 2], &mut [0.0; SIDE + 1]);
+                row
+            });
+            let sum = |row: &[f32]| row.iter().map(|v| f64::from(v * v)).sum::<f64>();
+            one += rows.iter().map(|row| 0.5 * sum(row)).sum::<f64>();
+            let [first, second] = &mut rows;
+            add_clouds(first, second);
+            squares += sum(first);
+            count += first.len() as f64;
+        }
+        // One field of finite size has another variance than the mean of all fields.
+        assert!((squares / one - 1.0).abs() < 0.05 && (one / count - 1.0).abs() < 0.1, "{one} {squares} {count}");
+    }
+
+    #[test]
     fn coarse_clouds_are_close_to_the_clouds() {
         let generator = NoiseFieldGenerator::new();
         let noise_fields = generator.fields(Key { seed: 4, index: 0 });
         let mut rng = Key { seed: 4, index: 0 }.stream("test", 0, "clouds");
         let like = Tile { origin: [5, -9], width: 83, values: vec![0.0; 83 * 61] };
-        for sigma_px in [SMOOTH_PX, 20.0, 50.0].repeat(4) {
-            let sampler = FieldSampler::clouds(sigma_px, &mut rng);
+        for (sigma_px, stretch) in [(SMOOTH_PX, 1.0), (20.0, 1.0), (2.0 * SMOOTH_PX, 4.0), (50.0, 1.0)].repeat(4) {
+            let sampler = FieldSampler::clouds(sigma_px, &mut rng).stretched(stretch, random::direction(&mut rng));
             let mut coarse = CoarseTile::noise(&like, noise_fields.clouds(), &sampler);
             let [mut row, mut exact] = [(); 2].map(|()| vec![0.0_f32; like.width]);
             let mut squares = 0.0;

@@ -16,7 +16,7 @@ const STEP_UM: f64 = 0.5;
 
 /// Fraction of wrinkles that are a rolled stretch of the rim. This and the next three numbers were set so that lines
 /// along rims are about as frequent as in real fields (docs/decisions.md, "Rolled rims"), and as dark, by eye.
-const ROLLED: f64 = 0.2;
+const ROLLED: f64 = 0.125;
 /// Thickness of a rolled stretch relative to that of a wrinkle: minimum, maximum.
 const ROLLED_THICKNESS: [f64; 2] = [0.4, 1.6];
 /// Width of a rolled stretch (standard deviation of its profile), µm: minimum, maximum.
@@ -155,7 +155,7 @@ fn at_steps(path: &[Point], step: f64) -> Vec<Point> {
     points
 }
 
-/// Draws random factors with a mean of about 1 and a correlation length of a few micrometres; some are 0.
+/// Draws random factors with a mean of about 1 and a correlation length of a few micrometres.
 fn random_factors(count: usize, rng: &mut Stream) -> Vec<f64> {
     let mut noise = Autoregression::new(0.35, rng);
     (0..count).map(|_| (0.9 + noise.next(rng)).clamp(0.0, 2.5)).collect()
@@ -251,7 +251,7 @@ struct WrinkleProfile {
     rise: f64,
     /// Fraction of the length over which it fades.
     fall: f64,
-    /// Factor on the strength of each step: wrinkles are interrupted.
+    /// Factor on the strength of each step: parts of a wrinkle are faint.
     factors: Vec<f64>,
 }
 
