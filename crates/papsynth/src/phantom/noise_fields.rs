@@ -55,8 +55,8 @@ pub(crate) type Texels = [f32; SIDE + 1];
 /// The position, mirroring and stretch at which one object samples a noise field.
 ///
 /// Sampling follows the rows of the field, so a row of pixels needs only two rows of texels. The fields are isotropic,
-/// so no rotation is needed: a stretch in any direction is a rotation of the field, which changes no statistics, and an upper
-/// triangular matrix, which keeps its rows.
+/// so no rotation is needed: a stretch in any direction is a rotation of the field, which changes no statistics, and an
+/// upper triangular matrix, which keeps its rows.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FieldSampler {
     origin: Point,
