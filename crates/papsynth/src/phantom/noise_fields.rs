@@ -262,7 +262,9 @@ mod tests {
     #[test]
     fn a_stretched_field_is_longer_along_the_direction_and_shorter_across_it() {
         let mut rng = Key { seed: 5, index: 0 }.stream("test", 0, "stretch");
-        for (stretch, direction) in [(1.0, 0.3), (2.0, 0.0), (3.0, 1.1), (2.5, -2.0), (4.0, 1.570_796)] {
+        for (stretch, direction) in
+            [(1.0, 0.3), (2.0, 0.0), (3.0, 1.1), (2.5, -2.0), (4.0, core::f64::consts::FRAC_PI_2)]
+        {
             let sampler = FieldSampler::new(4.0, &mut rng).stretched(stretch, direction);
             let texels = |[x, y]: Point| {
                 let [u, v] = [x * sampler.step[0] + y * sampler.shear, y * sampler.step[1]];
