@@ -128,12 +128,12 @@ impl FieldSampler {
 
     /// Returns the sampler of a field that is `stretch` times as long in a direction as across it, with the same area.
     pub(crate) fn stretched(self, stretch: f64, direction_rad: f64) -> Self {
+        debug_assert!(self.shear == 0.0 && stretch > 0.0, "{stretch}");
         let (sin, cos) = (libm::sin(direction_rad), libm::cos(direction_rad));
         // AᵀA for the matrix A of the stretch, and its Cholesky factor. The determinant of A is 1.
         let xx = cos * cos / stretch + sin * sin * stretch;
         let xy = sin * cos * (1.0 / stretch - stretch);
         let [x, y] = self.step;
-        debug_assert!(self.shear == 0.0 && stretch > 0.0, "{stretch}");
         let x_scale = xx.sqrt();
         Self { step: [x * x_scale, y / x_scale], shear: x * xy / x_scale, ..self }
     }
