@@ -37,7 +37,7 @@ pub(crate) fn correlate(
     // Rounding adds uncorrelated noise.
     let rounding_gain = 1.0 + ROUNDING / variance.max(ROUNDING);
     let correlation = fusion.noise_correlation.map(|wanted| (wanted * rounding_gain).min(MAX_CORRELATION));
-    let [across, down] = [0, 1].map(|axis| kernel(correlation[axis], SECOND_NEIGHBOUR[axis]));
+    let [across, down] = kernels(correlation);
     let structure = structure(expected, width, channels);
     let half = (HALF_UNCORRELATED * variance) as f32;
     let centre = across[0] * down[0];
@@ -86,7 +86,7 @@ pub(crate) fn correlate(
             let structured = structure[at] / (structure[at] + half).max(f32::MIN_POSITIVE);
             let sharp = structure[at] / (structure[at] + variance as f32).max(f32::MIN_POSITIVE);
             let bright = ((expected[at] / top - DARK[0]) / (DARK[1] - DARK[0])).clamp(0.0, 1.0);
-            let correlated = bright * (1.0 - structured);
+            let correlated = (1.0 - WHITE) * bright * (1.0 - structured);
             let uncorrelated = 1.0 - correlated;
             // The filtered noise includes the pixel's own noise, so the two variances do not simply add.
             let norm =
@@ -173,6 +173,11 @@ fn equalise(values: &mut [f32]) {
     }
 }
 
+/// Weight of uncorrelated noise on the empty slide, relative to the sum of both weights: fitted, with [`GAIN`] and
+/// [`LINES`], to the spectra of 24 real EDF images on the empty slide and in cells. Where both spatial frequencies are
+/// high, their noise is stronger than that of a product of two filters.
+const WHITE: f32 = 0.2;
+
 /// Variance of structure, relative to that of noise, at which half of a pixel's noise is uncorrelated: fitted to the
 /// noise on cytoplasm and nuclei of real EDF images.
 const HALF_UNCORRELATED: f64 = 80.0;
@@ -184,10 +189,10 @@ const DARK: [f32; 2] = [-0.1, 0.6];
 
 /// Increase of the variance of noise where a plane is sharper than others, relative to the empty slide, where several
 /// planes are averaged: fitted to the noise on the cytoplasm of real EDF images.
-const GAIN: f32 = 0.35;
+const GAIN: f32 = 0.2;
 
 /// Amplitude of the lines along rows and columns in structured regions, relative to the noise filtered to such lines.
-const LINES: f32 = 1.5;
+const LINES: f32 = 2.2;
 
 /// Noise of a plane relative to that of the fused image: fitted to the decrease of noise just below the highest grey
 /// level of real EDF images.
@@ -264,12 +269,41 @@ fn mirrored(at: usize, step: i64, count: usize) -> usize {
 /// Correlation of noise two pixels apart, in x and y: measured on EDF images.
 const SECOND_NEIGHBOUR: [f64; 2] = [-0.016, 0.021];
 
+/// Returns the filters along rows and columns with which the noise of the empty slide, the sum of filtered and
+/// uncorrelated noise, has these correlations of neighbours, and those of [`SECOND_NEIGHBOUR`].
+fn kernels(correlation: [f64; 2]) -> [[f32; 3]; 2] {
+    /// Steps of the fixed-point iteration, far more than convergence needs.
+    const STEPS: usize = 40;
+    /// Largest correlation of neighbours that a filter can produce, about.
+    const LIMIT: f64 = 0.57;
+    let white = f64::from(WHITE);
+    let rest = 1.0 - white;
+    let wanted = [0, 1].map(|axis| {
+        let second = if correlation[axis] > 0.0 { SECOND_NEIGHBOUR[axis] } else { 0.0 };
+        [correlation[axis], second]
+    });
+    let (mut of_filters, mut filters) = (wanted, [[0.0; 3]; 2]);
+    for _ in 0..STEPS {
+        filters = of_filters.map(kernel);
+        let weights = filters.map(|filter| filter.map(f64::from));
+        let variance = white * white + rest * rest + 2.0 * white * rest * weights[0][0] * weights[1][0];
+        for (axis, of_filter) in of_filters.iter_mut().enumerate() {
+            for (step, correlation) in of_filter.iter_mut().enumerate() {
+                let shared = weights[axis][step + 1] * weights[1 - axis][0];
+                let found = (rest * rest * *correlation + 2.0 * white * rest * shared) / variance;
+                *correlation += wanted[axis][step] - found;
+            }
+            of_filter[0] = of_filter[0].clamp(0.0, LIMIT);
+        }
+    }
+    filters
+}
+
 /// Returns the centre and right half of the symmetric filter (b, a, 1, a, b), normalised by the root of the sum of
 /// squares, that gives these correlations: ρ₁ = 2a(1 + b)/n, ρ₂ = (2b + a²)/n with n = 1 + 2a² + 2b².
-fn kernel(correlation: f64, second: f64) -> [f32; 3] {
+fn kernel([correlation, second]: [f64; 2]) -> [f32; 3] {
     /// Steps of the fixed-point iteration, far more than convergence to a fraction of a per mille needs.
     const STEPS: usize = 60;
-    let second = if correlation > 0.0 { second } else { 0.0 };
     let (mut a, mut b) = (0.0_f64, 0.0_f64);
     for _ in 0..STEPS {
         let n = 1.0 + 2.0 * a * a + 2.0 * b * b;

@@ -61,7 +61,7 @@ const SMOOTH_PX: f64 = 3.0 * COARSE as f64;
 const TEXTURE_THICKNESS: f32 = 1.3;
 
 /// Sizes of the two noise fields of clouds, relative to `clouds_um`. Set by eye.
-const CLOUDS_SIZES: [f64; 2] = [1.2, 0.7];
+const CLOUDS_SIZES: [f64; 2] = [1.2, 0.6];
 
 /// The clouds of a cell: the sum of two noise fields, each stretched in a direction of its own, with variance 1.
 /// Cytoplasm of real cells has strands and folds that cross rather than round clouds.
