@@ -58,7 +58,7 @@ section! {
         /// Diameter of the cytoplasm of a lobed leukocyte.
         cytoplasm_diameter_um: Number = Number::normal(11.6, 1.5).at_least(7.0), 1..=100, "µm";
         /// Probability that a lobed leukocyte is degenerated, with a smudged or pyknotic nucleus and frayed cytoplasm.
-        degenerated: Number = 0.35, 0..=1;
+        degenerated: Number = 0.45, 0..=1;
         /// Fraction of the degenerated leukocytes whose nucleus is pyknotic: small and dark, without structure.
         pyknotic: Number = 0.2, 0..=1;
         /// Fraction of the lobed leukocytes that are histiocytes, which are larger and have a kidney-shaped nucleus.
@@ -68,7 +68,7 @@ section! {
         /// Absorbance of the nucleus, before the nuclear stain factor of the field.
         absorbance: Number = Number::normal(0.29, 0.06).at_least(0.1), 0..=4;
         /// Absorbance of the cytoplasm.
-        cytoplasm_absorbance: Number = Number::log_normal(0.13, 0.45), 0..=4;
+        cytoplasm_absorbance: Number = Number::log_normal(0.14, 0.5), 0..=4;
     }
 }
 
@@ -212,7 +212,7 @@ const PYKNOTIC_RADIUS: [f64; 2] = [0.6, 0.9];
 /// Absorbance of a pyknotic nucleus relative to an intact one: minimum, maximum.
 const PYKNOTIC_ABSORBANCE: [f64; 2] = [1.1, 1.4];
 /// Radius of a smudged nucleus relative to an intact one: minimum, maximum.
-const SMUDGED_RADIUS: [f64; 2] = [0.85, 1.15];
+const SMUDGED_RADIUS: [f64; 2] = [0.9, 1.2];
 /// Absorbance of a smudged nucleus relative to an intact one: minimum, maximum.
 const SMUDGED_ABSORBANCE: [f64; 2] = [0.55, 0.95];
 

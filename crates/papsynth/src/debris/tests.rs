@@ -439,7 +439,7 @@ fn every_variant_of_leukocytes_and_debris_occurs() {
     let share = |which: fn(&Leukocyte) -> bool| {
         bodies.iter().filter(|(.., body)| which(body)).count() as f64 / bodies.len() as f64
     };
-    assert!((0.26..0.42).contains(&share(|body| body.degenerated)));
+    assert!((0.36..0.52).contains(&share(|body| body.degenerated)));
     assert!((0.03..0.12).contains(&share(|body| body.pyknotic)));
     assert!((0.01..0.08).contains(&share(|body| body.form == NucleusForm::Kidney)));
     assert!((0.22..0.38).contains(&share(|body| body.remains)));

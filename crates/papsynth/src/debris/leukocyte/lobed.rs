@@ -46,11 +46,9 @@ const HISTIOCYTE: Row = Row { step: [0.55, 0.7], turn: [0.3, 0.7], size: [0.92, 
 /// Half-width of the bridge between two lobes, in radii of a lobe.
 const BRIDGE: f64 = 0.5;
 
-/// Absorbance at the rim of a nucleus relative to its centre. Leukocytes are nearly spherical on these slides, so that
-/// their edges are softer than those of the flat nuclei of epithelial cells.
-const RIM: f64 = 0.15;
-/// The same for a smudged nucleus.
-const SMUDGED_RIM: f64 = 0.1;
+/// Absorbance at the rim of a nucleus relative to its centre: minimum, maximum. Most leukocytes are nearly spherical on
+/// these slides, so that their edges are softer than those of the flat nuclei of epithelial cells; some are flat.
+const RIM: [f64; 2] = [0.1, 0.6];
 
 /// Irregularity of the outline of a pyknotic nucleus: standard deviation of the second harmonic.
 const IRREGULAR: f64 = 0.06;
@@ -62,9 +60,16 @@ const SMUDGED: f64 = 0.2;
 /// Contrast of the chromatin of a pyknotic nucleus.
 const PYKNOTIC: f64 = 0.03;
 /// Contrast of the vacuoles of a cytoplasm: minimum, maximum.
-const VACUOLES: [f64; 2] = [0.1, 0.45];
+const VACUOLES: [f64; 2] = [0.05, 0.3];
 /// Contrast of the vacuoles of a histiocyte.
 const FOAM: f64 = 0.5;
+
+/// Remains of the lobes of a smudged nucleus, with pale clefts between them: fewest and most.
+const SMUDGED_LOBES: [usize; 2] = [1, 4];
+/// Relative decrease of absorbance in a cleft: minimum, maximum.
+const CLEFT: [f64; 2] = [0.1, 0.4];
+/// Width (standard deviation) of a cleft, µm.
+const CLEFT_UM: f64 = 0.35;
 
 /// Size (standard deviation) of clumps of chromatin, µm.
 const CLUMP_UM: f64 = 0.45;
@@ -76,12 +81,12 @@ const BORDER_UM: f64 = 0.5;
 /// Relative increase of absorbance in the border: minimum, maximum.
 const BORDER: [f64; 2] = [0.0, 0.25];
 /// Absorbance at the edge of a rounded cytoplasm relative to its centre: minimum, maximum.
-const FLATNESS: [f64; 2] = [0.0, 0.5];
+const FLATNESS: [f64; 2] = [0.0, 0.9];
 
 /// Softness, µm: standard deviation of the blur of a leukocyte, minimum and maximum. Leukocytes are about as high as
 /// wide, so that most of a leukocyte is out of focus in every plane, and also in fused images. The range was chosen by
 /// eye beside fused and unfused images.
-const SOFTNESS_UM: [f64; 2] = [0.1, 0.45];
+const SOFTNESS_UM: [f64; 2] = [0.08, 0.42];
 /// Reach of this blur, in standard deviations.
 const SOFT_REACH: f64 = 3.0;
 
@@ -137,7 +142,13 @@ pub(super) fn make(leukocyte: &Leukocyte, context: &ObjectContext<'_>) -> Phanto
         let half_width = context.px(BRIDGE * pair[0].radius.min(pair[1].radius));
         nucleus.stroke(&Stroke::even(ends[0], ends[1], half_width), 0.0);
     }
-    domed(&mut nucleus, &shapes, leukocyte);
+    let smudged = leukocyte.degenerated && !leukocyte.pyknotic;
+    let rim = random::between(RIM[0], RIM[1], &mut rng);
+    domed(&mut nucleus, &shapes, leukocyte.absorbance, rim);
+    if smudged {
+        let clefts = Clefts::new(at, leukocyte.radius_um, context, &mut rng);
+        nucleus.absorbance.for_each(|p, value| *value *= clefts.factor(p));
+    }
     let chromatin = match (leukocyte.pyknotic, leukocyte.degenerated) {
         (true, _) => PYKNOTIC,
         (false, true) => SMUDGED,
@@ -314,12 +325,51 @@ fn add_remains(remains: &Tuft, canvas: &mut ObjectCanvas, context: &ObjectContex
     covers.for_each(|(cover, other)| *cover = cover.max(*other));
 }
 
-/// Sets the absorbance of a nucleus from the summed thickness of its lobes.
-fn domed(nucleus: &mut ObjectCanvas, shapes: &[Vec<Point>], leukocyte: &Leukocyte) {
+/// Pale clefts between the remains of the lobes of a smudged nucleus: pixels that are about as close to two of them.
+struct Clefts {
+    /// Centres of the remains, px.
+    centres: Vec<Point>,
+    /// Relative decrease of absorbance.
+    depth: f64,
+    /// Standard deviation of the difference of the distances, px.
+    width: f64,
+}
+
+impl Clefts {
+    /// Draws the clefts of a nucleus with this centre and radius, µm.
+    fn new(at: Point, radius: f64, context: &ObjectContext<'_>, rng: &mut Stream) -> Self {
+        /// Largest distance of the centre of remains from that of the nucleus, in its radii.
+        const REACH: f64 = 0.8;
+        let count = SMUDGED_LOBES[0] + random::below(SMUDGED_LOBES[1] - SMUDGED_LOBES[0] + 1, rng);
+        let centres = (0..count)
+            .map(|_| {
+                let (distance, direction) = (REACH * radius * random::uniform(rng).sqrt(), random::direction(rng));
+                let [x, y] = [distance * libm::cos(direction), distance * libm::sin(direction)];
+                context.to_grid([at[0] + x, at[1] + y])
+            })
+            .collect();
+        Self { centres, depth: random::between(CLEFT[0], CLEFT[1], rng), width: 2.0 * context.px(CLEFT_UM) }
+    }
+
+    /// Returns the factor on the absorbance at a pixel.
+    fn factor(&self, p: Point) -> f32 {
+        let [mut nearest, mut second] = [f64::INFINITY; 2];
+        for centre in &self.centres {
+            let (dx, dy) = (p[0] - centre[0], p[1] - centre[1]);
+            let distance = (dx * dx + dy * dy).sqrt();
+            second = second.min(distance.max(nearest));
+            nearest = nearest.min(distance);
+        }
+        let off = (second - nearest) / self.width;
+        (1.0 - self.depth * libm::exp(-0.5 * off * off)) as f32
+    }
+}
+
+/// Sets the absorbance of a nucleus from the summed thickness of its lobes. `rim` is the absorbance at its edge
+/// relative to its centre.
+fn domed(nucleus: &mut ObjectCanvas, shapes: &[Vec<Point>], absorbance: f64, rim: f64) {
     /// Upper limit of the thickness of overlapping lobes.
     const MAX_THICKNESS: f64 = 1.3;
-    let smudged = leukocyte.degenerated && !leukocyte.pyknotic;
-    let rim = if smudged { SMUDGED_RIM } else { RIM };
     let spheres: Vec<(Point, f64)> = shapes.iter().map(|lobe| (fsd_shape::centroid(lobe), area(lobe) / PI)).collect();
     nucleus.shade(|p| {
         let chord = |(centre, square): &(Point, f64)| {
@@ -327,6 +377,21 @@ fn domed(nucleus: &mut ObjectCanvas, shapes: &[Vec<Point>], leukocyte: &Leukocyt
             (1.0 - (dx * dx + dy * dy) / square).max(0.0).sqrt()
         };
         let thickness = spheres.iter().map(chord).sum::<f64>().min(MAX_THICKNESS);
-        leukocyte.absorbance * (rim + (1.0 - rim) * 1.2 * thickness)
+        absorbance * (rim + (1.0 - rim) * 1.2 * thickness)
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clefts_are_palest_midway_between_remains() {
+        let clefts = Clefts { centres: vec![[0.0, 0.0], [10.0, 0.0], [4.0, 30.0]], depth: 0.4, width: 2.0 };
+        assert!((clefts.factor([5.0, 2.0]) - 0.6).abs() < 1e-6);
+        assert!(clefts.factor([4.0, 0.0]) > clefts.factor([5.0, 0.0]));
+        assert!(clefts.factor([0.0, 0.0]) > 0.999 && clefts.factor([4.0, 29.0]) > 0.999);
+        let one = Clefts { centres: vec![[0.0, 0.0]], ..clefts };
+        assert_eq!(one.factor([3.0, 1.0]), 1.0);
+    }
 }
