@@ -37,7 +37,7 @@ from scipy.optimize import linear_sum_assignment
 SIDE, BATCH = 192, 8  # of the crops of a batch
 DISC = 10  # radius of the discs at annotated centres, pixels
 REACH = 12  # largest distance of a detection from a nucleus, pixels
-THRESHOLD = 0.5  # probability of detections, chosen on the half of the fields that a recipe is matched to
+THRESHOLD = 0.7  # probability of detections, chosen on the half of the fields that a recipe is matched to
 MASK_THRESHOLD = 0.5  # probability of masks
 SMALLEST = 60  # area of a detection, pixels
 SCALES = (1.0, 1.2)  # of the image with a mask, whose pixel size is not known
@@ -47,7 +47,7 @@ LAST = 0.6  # part of the steps in which only the last set is used
 CYTOPLASM, SHRED, LEUKOCYTE = (1, 2), 4, 5  # semantic classes; shreds and leukocytes look like nuclei
 MIMIC_CROPS = 0.35  # share of the crops that are chosen to show such objects
 NUCLEUS_WEIGHT = 3.0  # of pixels of nuclei, and of objects that look like them
-ON_CELL = 0.5  # share of the surroundings of a leukocyte on a cell that are cytoplasm
+ON_CELL = 0.1  # share of the surroundings of a leukocyte on a cell that are cytoplasm
 SURROUNDINGS = 3  # width of the surroundings, pixels
 CERTAIN = 0.8  # probability that a fifth of the pixels of a nucleus exceed in a field without labels
 BACKGROUND = 0.2  # probability below which pixels are no nuclei

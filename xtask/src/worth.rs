@@ -28,7 +28,7 @@ const FOR_TRAINING: [&str; 2] = [
 const WIDEN: &str = "1.5";
 
 /// Version of `nucleus_net.py`: results of another version are kept apart.
-const METHOD: u32 = 3;
+const METHOD: u32 = 4;
 
 /// Version of `overlap_net.py` and of its sets: results of another version are kept apart.
 const OVERLAP_METHOD: u32 = 2;
