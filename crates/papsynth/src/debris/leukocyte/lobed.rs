@@ -46,8 +46,8 @@ const HISTIOCYTE: Row = Row { step: [0.55, 0.7], turn: [0.3, 0.7], size: [0.92, 
 /// Half-width of the bridge between two lobes, in radii of a lobe.
 const BRIDGE: f64 = 0.5;
 
-/// Absorbance at the rim of a nucleus relative to its centre: minimum, maximum. Most leukocytes are nearly spherical on
-/// these slides, so that their edges are softer than those of the flat nuclei of epithelial cells; some are flat.
+/// Absorbance at the rim of a nucleus relative to its centre: minimum, maximum. Spherical nuclei have softer
+/// edges than the flat nuclei of epithelial cells. Set by eye beside real fields, as the numbers of clefts below.
 const RIM: [f64; 2] = [0.1, 0.6];
 
 /// Irregularity of the outline of a pyknotic nucleus: standard deviation of the second harmonic.
@@ -80,11 +80,12 @@ const VACUOLE_UM: [f64; 2] = [0.25, 0.45];
 const BORDER_UM: f64 = 0.5;
 /// Relative increase of absorbance in the border: minimum, maximum.
 const BORDER: [f64; 2] = [0.0, 0.25];
-/// Absorbance at the edge of a rounded cytoplasm relative to its centre: minimum, maximum.
+/// Absorbance at the edge of a cytoplasm relative to its centre, from a sphere to a flat disc: minimum, maximum.
+/// Independent of that of the nucleus.
 const FLATNESS: [f64; 2] = [0.0, 0.9];
 
-/// Softness, µm: standard deviation of the blur of a leukocyte, minimum and maximum. Leukocytes are about as high as
-/// wide, so that most of a leukocyte is out of focus in every plane, and also in fused images. The range was chosen by
+/// Softness, µm: standard deviation of the blur of a leukocyte, minimum and maximum. Many leukocytes are about as high
+/// as wide, so that most of a leukocyte is out of focus in every plane, and also in fused images. The range was chosen by
 /// eye beside fused and unfused images.
 const SOFTNESS_UM: [f64; 2] = [0.08, 0.42];
 /// Reach of this blur, in standard deviations.
@@ -146,7 +147,7 @@ pub(super) fn make(leukocyte: &Leukocyte, context: &ObjectContext<'_>) -> Phanto
     let rim = random::between(RIM[0], RIM[1], &mut rng);
     domed(&mut nucleus, &shapes, leukocyte.absorbance, rim);
     if smudged {
-        let clefts = Clefts::new(at, leukocyte.radius_um, context, &mut rng);
+        let clefts = Clefts::new(at, lobes[0].radius, context, &mut rng);
         nucleus.absorbance.for_each(|p, value| *value *= clefts.factor(p));
     }
     let chromatin = match (leukocyte.pyknotic, leukocyte.degenerated) {
@@ -325,13 +326,13 @@ fn add_remains(remains: &Tuft, canvas: &mut ObjectCanvas, context: &ObjectContex
     covers.for_each(|(cover, other)| *cover = cover.max(*other));
 }
 
-/// Pale clefts between the remains of the lobes of a smudged nucleus: pixels that are about as close to two of them.
+/// Pale clefts between the remains of the lobes of a smudged nucleus, midway between their centres.
 struct Clefts {
     /// Centres of the remains, px.
     centres: Vec<Point>,
     /// Relative decrease of absorbance.
     depth: f64,
-    /// Standard deviation of the difference of the distances, px.
+    /// Width (standard deviation), px.
     width: f64,
 }
 
@@ -348,19 +349,19 @@ impl Clefts {
                 context.to_grid([at[0] + x, at[1] + y])
             })
             .collect();
-        Self { centres, depth: random::between(CLEFT[0], CLEFT[1], rng), width: 2.0 * context.px(CLEFT_UM) }
+        Self { centres, depth: random::between(CLEFT[0], CLEFT[1], rng), width: context.px(CLEFT_UM) }
     }
 
     /// Returns the factor on the absorbance at a pixel.
     fn factor(&self, p: Point) -> f32 {
-        let [mut nearest, mut second] = [f64::INFINITY; 2];
-        for centre in &self.centres {
-            let (dx, dy) = (p[0] - centre[0], p[1] - centre[1]);
-            let distance = (dx * dx + dy * dy).sqrt();
-            second = second.min(distance.max(nearest));
-            nearest = nearest.min(distance);
-        }
-        let off = (second - nearest) / self.width;
+        let square = |a: Point, b: Point| (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]);
+        let nearest = self.centres.iter().min_by(|a, b| square(p, **a).total_cmp(&square(p, **b)));
+        let Some(nearest) = nearest else { return 1.0 };
+        // The distance from the closest line midway between two centres.
+        let others = self.centres.iter().filter(|other| *other != nearest);
+        let distance =
+            |other: &Point| 0.5 * (square(p, *other) - square(p, *nearest)) / square(*other, *nearest).sqrt();
+        let off = others.map(distance).fold(f64::INFINITY, f64::min) / self.width;
         (1.0 - self.depth * libm::exp(-0.5 * off * off)) as f32
     }
 }
@@ -390,7 +391,11 @@ mod tests {
         let clefts = Clefts { centres: vec![[0.0, 0.0], [10.0, 0.0], [4.0, 30.0]], depth: 0.4, width: 2.0 };
         assert!((clefts.factor([5.0, 2.0]) - 0.6).abs() < 1e-6);
         assert!(clefts.factor([4.0, 0.0]) > clefts.factor([5.0, 0.0]));
-        assert!(clefts.factor([0.0, 0.0]) > 0.999 && clefts.factor([4.0, 29.0]) > 0.999);
+        // As wide far from the line between the centres.
+        assert!((clefts.factor([3.0, 2.0]) - clefts.factor([3.0, -40.0])).abs() < 1e-6);
+        let expected = 1.0 - 0.4 * libm::exp(-0.5);
+        assert!((f64::from(clefts.factor([3.0, 2.0])) - expected).abs() < 1e-6);
+        assert!(clefts.factor([-2.0, 0.0]) > 0.99 && clefts.factor([4.0, 29.0]) > 0.99);
         let one = Clefts { centres: vec![[0.0, 0.0]], ..clefts };
         assert_eq!(one.factor([3.0, 1.0]), 1.0);
     }

@@ -237,10 +237,11 @@ impl Autoregression {
 /// Extent of a wrinkle to both sides of its crest, relative to its width; the second is that of the slope.
 const EXTENT: [f64; 2] = [3.0, 2.2 * SLOPE_WIDTH];
 
-/// Steps between points that are drawn as one straight segment.
+/// Largest number of steps between points that are drawn as one straight segment.
 const SEGMENT: usize = 3;
 
-/// Length by which each segment of a wrinkle overlaps the next one, relative to its width: bends have no gaps.
+/// Length by which each segment of a wrinkle overlaps the next one, relative to its width: the crest has no gaps in
+/// usual bends, and those of the slope are at its faint end.
 const OVERLAP: f64 = 0.5;
 
 /// The size, strength and interruptions of a wrinkle.
@@ -257,7 +258,7 @@ struct WrinkleProfile {
     rise: f64,
     /// Fraction of the length over which it fades.
     fall: f64,
-    /// Factor on the strength of each step: parts of a wrinkle are faint.
+    /// Factor on the strength at each point, of which those at the ends of segments count: parts of a wrinkle are faint.
     factors: Vec<f64>,
 }
 
@@ -294,9 +295,11 @@ impl WrinkleProfile {
         let origin = thickness.origin.map(|at| at as f64);
         // Column range of the wrinkle in each row.
         let mut touched = vec![width..0; height];
+        // At least two segments, since the strength is 0 at both ends of the path.
         let last = path.len() - 1;
-        for from in (0..last).step_by(SEGMENT) {
-            let ends = [from, (from + SEGMENT).min(last)];
+        let segments = last.div_ceil(SEGMENT).max(2).min(last);
+        for segment in 0..segments {
+            let ends = [segment, segment + 1].map(|end| end * last / segments);
             let rises = ends.map(|index| {
                 let t = index as f64 / last as f64;
                 let fade = (t / self.rise).min((1.0 - t) / self.fall).min(1.0);
@@ -342,7 +345,7 @@ struct Segment {
     off: Point,
     /// Range in these two directions, px.
     range: [[f64; 2]; 2],
-    /// Strengths at both ends; linear between them.
+    /// Strengths at both ends; linear between them, constant beyond.
     strengths: [f64; 2],
     /// 1/length, px⁻¹.
     per_length: f64,
@@ -400,7 +403,7 @@ impl Segment {
     }
 }
 
-/// Pixels computed together: few rows of a step are longer. Also the number of rows whose ends are computed together.
+/// Pixels computed together: few rows of a segment are longer. Also the number of rows whose ends are computed together.
 pub(super) const LANES: usize = 16;
 
 /// Raises pixels to the profile and extends the touched column range of each row.
@@ -413,6 +416,7 @@ fn paint(segment: &Segment, canvas: &mut [f32], width: usize, touched: &mut [Ran
     let step = (off[0] * per_width) as f32;
     let gradient = (strengths[1] - strengths[0]) * per_length;
     let stronger = (gradient * along[0]) as f32;
+    let [weak, strong] = [strengths[0].min(strengths[1]), strengths[0].max(strengths[1])].map(|end| end as f32);
     // The slope falls by these factors from a pixel to the next ones. Loops, since closures are compiled separately.
     let mut falls = [0.0; LANES];
     for (i, fall) in falls.iter_mut().enumerate() {
@@ -448,7 +452,10 @@ fn paint(segment: &Segment, canvas: &mut [f32], width: usize, touched: &mut [Ran
                     let fall = exp_f32(square * (exponents[0] + exponents[1] * square));
                     let above = slope * falls[i] - SLOPE as f32 * fall;
                     let crest = fall * (factors[0] + factors[1] * square);
-                    let profile = (strength + stronger * i as f32) * (crest + if off > 0.0 { above } else { 0.0 });
+                    let own = strength + stronger * i as f32;
+                    let own = if own > weak { own } else { weak };
+                    let own = if own < strong { own } else { strong };
+                    let profile = own * (crest + if off > 0.0 { above } else { 0.0 });
                     let profile = if (i as f32) < left { profile } else { 0.0 };
                     canvas[i] = if profile > canvas[i] { profile } else { canvas[i] };
                 }
@@ -506,7 +513,7 @@ mod tests {
                 let fall = libm::exp(if pleat { -0.3 * square * square } else { -0.5 * square });
                 let slope = if off > 0.0 { SLOPE * (libm::exp(-off / (SLOPE_WIDTH * 2.3)) - fall) } else { 0.0 };
                 let crest = fall * if pleat { 0.55 + 0.9 * square } else { 1.0 };
-                let expected = if inside { (0.8 + 0.1 * on) * (crest + slope) } else { 0.0 };
+                let expected = if inside { (0.8 + 0.1 * on).clamp(0.8, 1.5) * (crest + slope) } else { 0.0 };
                 assert!((f64::from(*value) - expected).abs() < 1e-5, "{direction}: {p:?} {value} {expected}");
                 painted += usize::from(inside);
                 assert!(!inside || touched[index / width].contains(&(index % width)), "{touched:?} {index}");
@@ -538,6 +545,24 @@ mod tests {
         assert!(roughness(20.0, 2.0) == roughness(8.0, 1.0) && roughness(20.0, 2.0) < 0.2);
         assert!(roughness(20.0, 2.0) < roughness(45.0, 1.0) && roughness(45.0, 1.0) < 1.0);
         assert_eq!(roughness(60.0, 0.0), 1.0);
+    }
+
+    #[test]
+    fn a_wrinkle_is_as_strong_as_its_factors_at_the_ends_of_segments() {
+        for points in [3_usize, 4, 5, 8, 24] {
+            let mut profile = profile(2.0, 1.0, false);
+            profile.factors = (0..points).map(|i| if i < points / 2 { 0.3 } else { 1.5 }).collect();
+            // Points two pixels apart along row 20, from column 20 on.
+            let path: Vec<Point> = (0..points).map(|i| [20.0 + 2.0 * i as f64, 20.0]).collect();
+            let tile = Tile { origin: [0, 0], width: 100, values: vec![1.0; 100 * 40] };
+            let mut drawn = Tile { values: vec![0.0; 100 * 40], ..tile.clone() };
+            profile.draw(&path, &mut drawn, &tile, &mut vec![0.0; 100 * 40 + LANES]);
+            let strongest = drawn.values.iter().copied().fold(0.0, f32::max);
+            assert!(strongest > 0.25 && strongest <= 1.5, "{points}: {strongest}");
+            // The first quarter of a long path is as faint as its factors.
+            let first = (0..100).map(|i| drawn.values[20 * 100 + i]).take(20 + points / 2);
+            assert!(points < 24 || first.fold(0.0, f32::max) <= 0.3, "{points}");
+        }
     }
 
     #[test]
