@@ -11,8 +11,9 @@ objects that look like nuclei, and their pixels count as much as those of nuclei
 the PNG files of a folder itself after half of the steps, and then learns from these and all SETs until the end; pixels
 of which it is not certain do not count.
 
-Leukocytes on cells do not count either: many cannot be told from nuclei, and a network that learns them as background
-misses nuclei near the rims of cells.
+Leukocytes that touch a cell do not count either: many cannot be told from nuclei, and a network that learns them as
+background misses nuclei near the rims of cells. Nor do pixels that a data set ignores: those of nuclei that cannot be
+seen.
 
 The test FOLDER holds real fields with centres and frames.csv with their grades. A nucleus is found if a detection lies
 within 12 pixels (4 µm). Detections at the border of the image count only if they find a nucleus. Writes the numbers of
@@ -44,10 +45,11 @@ SCALES = (1.0, 1.2)  # of the image with a mask, whose pixel size is not known
 CHANNELS = 12  # of the first level of the network
 CONTRAST = 4.0  # factor on the images
 LAST = 0.6  # part of the steps in which only the last set is used
-CYTOPLASM, SHRED, LEUKOCYTE = (1, 2), 4, 5  # semantic classes; shreds and leukocytes look like nuclei
+# Semantic classes: shreds and leukocytes look like nuclei; nuclei and such objects that cannot be seen are ignored.
+CYTOPLASM, SHRED, LEUKOCYTE, IGNORED = (1, 2), 4, 5, 255
 MIMIC_CROPS = 0.35  # share of the crops that are chosen to show such objects
 NUCLEUS_WEIGHT = 3.0  # of pixels of nuclei, and of objects that look like them
-ON_CELL = 0.1  # share of the surroundings of a leukocyte on a cell that are cytoplasm
+AT_CELL = 0.1  # least share of the surroundings of a leukocyte at a cell that are cytoplasm
 SURROUNDINGS = 3  # width of the surroundings, pixels
 CERTAIN = 0.8  # probability that a fifth of the pixels of a nucleus exceed in a field without labels
 BACKGROUND = 0.2  # probability below which pixels are no nuclei
@@ -83,15 +85,15 @@ def chosen(files, count):
     return [files[int((number + 0.5) * len(files) / count)] for number in range(count)]
 
 
-def on_cells(classes):
-    """Return the mask of the leukocytes whose surroundings are mostly cytoplasm."""
+def at_cells(classes):
+    """Return the mask of the leukocytes that lie on a cell or touch one."""
     found = np.zeros(classes.shape, bool)
     regions, _ = ndimage.label(classes == LEUKOCYTE)
     for index, box in enumerate(ndimage.find_objects(regions), 1):
         box = tuple(slice(max(side.start - SURROUNDINGS, 0), side.stop + SURROUNDINGS) for side in box)
         own = regions[box] == index
         around = ndimage.binary_dilation(own, iterations=SURROUNDINGS) & (classes[box] != LEUKOCYTE)
-        if np.isin(classes[box][around], CYTOPLASM).sum() > ON_CELL * around.sum():
+        if np.isin(classes[box][around], CYTOPLASM).sum() > AT_CELL * around.sum():
             found[box] |= own
     return found
 
@@ -121,8 +123,9 @@ def load(name):
             pair = [np.take(labels, range(s, labels.shape[axis] - 1 + s), axis) for s in (0, 1)]
             touching = (pair[0] != pair[1]) & (pair[0] > 0) & (pair[1] > 0)
             border |= np.pad(touching, [(1, 0) if a == axis else (0, 0) for a in (0, 1)])
-        ignored = on_cells(classes)
-        masks = (labels > 0) & ~border, np.isin(classes, (SHRED, LEUKOCYTE)) & ~ignored, ignored & (labels == 0)
+        beside, unseen = at_cells(classes), classes == IGNORED
+        ignored = (beside & (labels == 0)) | unseen
+        masks = (labels > 0) & ~border & ~unseen, np.isin(classes, (SHRED, LEUKOCYTE)) & ~beside, ignored
         fields.append((normalized(Image.open(file)), *(mask.astype(np.float32) for mask in masks)))
     return fields
 

@@ -258,7 +258,7 @@ struct WrinkleProfile {
     rise: f64,
     /// Fraction of the length over which it fades.
     fall: f64,
-    /// Factor on the strength at each point, of which those at the ends of segments count: parts of a wrinkle are faint.
+    /// Factor on the strength at each point; those at the ends of segments count. Parts of a wrinkle are faint.
     factors: Vec<f64>,
 }
 
@@ -403,7 +403,7 @@ impl Segment {
     }
 }
 
-/// Pixels computed together: few rows of a segment are longer. Also the number of rows whose ends are computed together.
+/// Pixels computed together: few rows of a segment are longer. Also the rows whose ends are computed together.
 pub(super) const LANES: usize = 16;
 
 /// Raises pixels to the profile and extends the touched column range of each row.
