@@ -85,8 +85,8 @@ const BORDER: [f64; 2] = [0.0, 0.25];
 const FLATNESS: [f64; 2] = [0.0, 0.9];
 
 /// Softness, µm: standard deviation of the blur of a leukocyte, minimum and maximum. Many leukocytes are about as high
-/// as wide, so that most of a leukocyte is out of focus in every plane, and also in fused images. The range was chosen by
-/// eye beside fused and unfused images.
+/// as wide, so that most of such a leukocyte is out of focus in every plane, and also in fused images. The range was
+/// chosen by eye beside fused and unfused images.
 const SOFTNESS_UM: [f64; 2] = [0.08, 0.42];
 /// Reach of this blur, in standard deviations.
 const SOFT_REACH: f64 = 3.0;
