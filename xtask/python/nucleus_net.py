@@ -12,8 +12,7 @@ the PNG files of a folder itself after half of the steps, and then learns from t
 of which it is not certain do not count.
 
 Leukocytes that touch a cell do not count either: many cannot be told from nuclei, and a network that learns them as
-background misses nuclei near the rims of cells. Nor do pixels that a data set ignores: those of nuclei that cannot be
-seen.
+background misses nuclei near the rims of cells.
 
 The test FOLDER holds real fields with centres and frames.csv with their grades. A nucleus is found if a detection lies
 within 12 pixels (4 µm). Detections at the border of the image count only if they find a nucleus. Writes the numbers of
@@ -45,8 +44,7 @@ SCALES = (1.0, 1.2)  # of the image with a mask, whose pixel size is not known
 CHANNELS = 12  # of the first level of the network
 CONTRAST = 4.0  # factor on the images
 LAST = 0.6  # part of the steps in which only the last set is used
-# Semantic classes: shreds and leukocytes look like nuclei; nuclei and such objects that cannot be seen are ignored.
-CYTOPLASM, SHRED, LEUKOCYTE, IGNORED = (1, 2), 4, 5, 255
+CYTOPLASM, SHRED, LEUKOCYTE = (1, 2), 4, 5  # semantic classes; shreds and leukocytes look like nuclei
 MIMIC_CROPS = 0.35  # share of the crops that are chosen to show such objects
 NUCLEUS_WEIGHT = 3.0  # of pixels of nuclei, and of objects that look like them
 AT_CELL = 0.1  # least share of the surroundings of a leukocyte at a cell that are cytoplasm
@@ -123,9 +121,8 @@ def load(name):
             pair = [np.take(labels, range(s, labels.shape[axis] - 1 + s), axis) for s in (0, 1)]
             touching = (pair[0] != pair[1]) & (pair[0] > 0) & (pair[1] > 0)
             border |= np.pad(touching, [(1, 0) if a == axis else (0, 0) for a in (0, 1)])
-        beside, unseen = at_cells(classes), classes == IGNORED
-        ignored = (beside & (labels == 0)) | unseen
-        masks = (labels > 0) & ~border & ~unseen, np.isin(classes, (SHRED, LEUKOCYTE)) & ~beside, ignored
+        ignored = at_cells(classes)
+        masks = (labels > 0) & ~border, np.isin(classes, (SHRED, LEUKOCYTE)) & ~ignored, ignored & (labels == 0)
         fields.append((normalized(Image.open(file)), *(mask.astype(np.float32) for mask in masks)))
     return fields
 
