@@ -47,6 +47,10 @@ LAST = 0.6  # part of the steps in which only the last set is used
 CYTOPLASM, SHRED, LEUKOCYTE = (1, 2), 4, 5  # semantic classes; shreds and leukocytes look like nuclei
 MIMIC_CROPS = 0.35  # share of the crops that are chosen to show such objects
 NUCLEUS_WEIGHT = 3.0  # of pixels of nuclei, and of objects that look like them
+GAMMA = 1.4  # largest exponent on the darkness of crops, relative to the empty slide
+FIXED = 0.3  # darkness that this exponent does not change
+UNEVEN = 0.03  # standard deviation of the unevenness of light
+NOISE = 0.03  # largest standard deviation of the noise
 AT_CELL = 0.1  # least share of the surroundings of a leukocyte at a cell that are cytoplasm
 SURROUNDINGS = 3  # width of the surroundings, pixels
 CERTAIN = 0.8  # probability that a fifth of the pixels of a nucleus exceed in a field without labels
@@ -154,7 +158,7 @@ def network():
 
 
 def crop(fields, rng):
-    """Return a random crop: turned, mirrored, with other light, blur and noise.
+    """Return a random crop: turned, mirrored, with other contrast, light, blur and noise.
 
     Most crops have a nucleus or an object that looks like one.
     """
@@ -168,11 +172,15 @@ def crop(fields, rng):
     turns, mirrored = rng.integers(4), rng.random() < 0.5
     turned = (np.rot90(values[part][::-1] if mirrored else values[part], turns) for values in field)
     grey, nuclei, mimics, ignored = turned
+    darkness = np.clip(-grey, 0, 1)
+    exponent = GAMMA ** rng.uniform(-1, 1)
+    grey = np.maximum(grey, 0) - darkness**exponent * FIXED ** (1 - exponent)
     grey = grey * rng.uniform(0.8, 1.25) + rng.uniform(-0.03, 0.03)
+    grey = (1 + grey) * (1 + UNEVEN * ndimage.zoom(rng.normal(size=(4, 4)), SIDE / 4, order=1)) - 1
     if rng.random() < 0.5:
         grey = ndimage.gaussian_filter(grey, rng.uniform(0.3, 1.2))
     weight = np.where((nuclei > 0) | (mimics > 0), NUCLEUS_WEIGHT, 1) * (1 - ignored)
-    return grey + rng.normal(0, rng.uniform(0, 0.02), grey.shape), nuclei, weight
+    return grey + rng.normal(0, rng.uniform(0, NOISE), grey.shape), nuclei, weight
 
 
 def own_labels(net, image):

@@ -15,20 +15,30 @@ const PACKAGES: &str = "numpy\npillow\nscipy\n\
     tensorflow-cpu; sys_platform == 'linux' and platform_machine == 'x86_64'\n\
     tensorflow; sys_platform != 'linux' or platform_machine != 'x86_64'\n";
 
-/// Number of fields generated for each grade.
+/// Number of fields generated for each grade and each of [`LEUKOCYTES`].
 const FRAMES: &str = "40";
 
-/// Changes of the matched recipes: more objects that look like nuclei, and more degenerated cells (docs/WORTH.md).
-const FOR_TRAINING: [&str; 2] = [
-    "debris.leukocytes.clusters.per_mm2.uniform=[10,120]",
-    "cytoplasm.degeneration={ log_normal = [0.3, 1], max = 2 }",
+/// Change of the matched recipes for training: more degenerated cells (docs/WORTH.md).
+const DEGENERATION: &str = "cytoplasm.degeneration={ log_normal = [0.3, 1], max = 2 }";
+
+/// Changes of the leukocytes, which look like nuclei: clusters, and more that lie alone on the empty slide.
+const LEUKOCYTES: [(&str, &[&str]); 2] = [
+    ("clusters", &["debris.leukocytes.clusters.per_mm2.uniform=[10,120]"]),
+    (
+        "single",
+        &[
+            "debris.leukocytes.clusters.per_mm2.uniform=[30,250]",
+            "debris.leukocytes.per_cluster={ log_normal = [1, 0.6], max = 12 }",
+            "debris.leukocytes.on_cells=0.2",
+        ],
+    ),
 ];
 
 /// Factor of `papsynth generate --widen`.
 const WIDEN: &str = "1.5";
 
 /// Version of `nucleus_net.py`: results of another version are kept apart.
-const METHOD: u32 = 4;
+const METHOD: u32 = 5;
 
 /// Version of `overlap_net.py` and of its sets: results of another version are kept apart.
 const OVERLAP_METHOD: u32 = 2;
@@ -176,7 +186,7 @@ fn overlap(workspace: &Workspace, options: &Worth) -> Result<()> {
     Ok(())
 }
 
-/// Returns a folder with a data set of synthetic fields for each grade, matched to a half of the real ones.
+/// Returns a folder with two data sets of synthetic fields for each grade, matched to a half of the real ones.
 fn synthetic(workspace: &Workspace, folder: &Path, real: &Path, half: usize, widen: &str) -> Result<PathBuf> {
     let out = folder.join(format!("synthetic-{half}-{widen}"));
     if out.exists() {
@@ -192,12 +202,16 @@ fn synthetic(workspace: &Workspace, folder: &Path, real: &Path, half: usize, wid
             fit.args(["match", "--pixel-um", PIXEL_UM, "--group", grade, "--preset", preset, "--out"]);
             shell::run(fit.arg(&recipe).arg(real))?;
         }
-        // With one seed for all, the grades would have the same scenes.
-        let seed = (GRADES.len() * half + number).to_string();
-        let words = ["--frames", FRAMES, "--seed", &seed, "--widen", widen, "--set", "slide.fields_per_slide=1"];
-        let words = words.into_iter().chain(["--without", "noise-free,layers,contact-sheet"]);
-        let words = words.chain(FOR_TRAINING.into_iter().flat_map(|set| ["--set", set])).map(PathBuf::from);
-        dataset::generate(program(workspace), &partial.join(grade), [recipe].into_iter().chain(words))?;
+        for (set, (name, leukocytes)) in LEUKOCYTES.into_iter().enumerate() {
+            // With one seed for all, the data sets would have the same scenes.
+            let seed = (GRADES.len() * (2 * set + half) + number).to_string();
+            let words = ["--frames", FRAMES, "--seed", &seed, "--widen", widen, "--set", "slide.fields_per_slide=1"];
+            let words =
+                words.into_iter().chain(["--without", "noise-free,layers,contact-sheet", "--set", DEGENERATION]);
+            let words = words.chain(leukocytes.iter().flat_map(|set| ["--set", *set])).map(PathBuf::from);
+            let out = partial.join(format!("{grade}-{name}"));
+            dataset::generate(program(workspace), &out, [recipe.clone()].into_iter().chain(words))?;
+        }
     }
     std::fs::rename(&partial, &out).with_context(|| format!("cannot write {}", out.display()))?;
     Ok(out)

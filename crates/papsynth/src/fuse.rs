@@ -189,7 +189,7 @@ const DARK: [f32; 2] = [-0.1, 0.6];
 
 /// Increase of the variance of noise where a plane is sharper than others, relative to the empty slide, where several
 /// planes are averaged: fitted to the noise on the cytoplasm of real EDF images.
-const GAIN: f32 = 0.2;
+const GAIN: f32 = 0.1;
 
 /// Amplitude of the lines along rows and columns in structured regions, relative to the noise filtered to such lines.
 const LINES: f32 = 2.2;

@@ -465,8 +465,15 @@ class Cytoplasm(Section):
     protrusions: Number | None = None
     """Number of protrusions of the rim. From 0 to 20."""
 
+    ridges: Number | None = None
+    """Largest additional thickness of narrow ridges, up to 1.4 µm wide, relative to the flat sheet. Ridges rise where
+    the sheet stands up along its rim or a fold. With 100 they keep their thickness, as in the paper. From 0 to 100.
+    """
+
     wrinkles: Number | None = None
-    """Number of wrinkles: ridges and pleats. An eighth of them are rolled stretches of the rim. From 0 to 100."""
+    """Number of wrinkles: ridges, pleats and bundles of fine ridges. An eighth of them are rolled stretches of the rim.
+    From 0 to 100.
+    """
 
     wrinkle_thickness: Number | None = None
     """Additional thickness at the crest of a wrinkle, relative to the flat sheet. Rolled stretches of the rim have 0.4

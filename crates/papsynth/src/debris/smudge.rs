@@ -40,7 +40,7 @@ section! {
         /// and larger.
         at_leukocytes: Number (undrawn) = 0.4, 0..=1;
         /// Probability that a clump is a folded shred of cytoplasm, which is darker and larger.
-        folded: Number (Chance as folded: "Whether it is a folded shred of cytoplasm.") = 0.06, 0..=1;
+        folded: Number (Chance as folded: "Whether it is a folded shred of cytoplasm.") = 0.04, 0..=1;
     }
 }
 

@@ -258,7 +258,7 @@ section! {
         /// Curvature of a crease times the radius of the cell, bent to either side: 0 is a straight line.
         curvature: Number = Number::uniform(0.10, 0.60), 0..=2;
         /// Amplitude of the longer of two waves of a crease, as a fraction of the radius of the cell.
-        waviness: Number = Number::uniform(0.04, 0.12), 0..=0.5;
+        waviness: Number = Number::uniform(0.02, 0.08), 0..=0.5;
         /// Bending radius of a flap. A rolled rim has twice this radius.
         radius_um: Number = Number::uniform(0.4, 1.2), 0.1..=5, "µm";
     }
@@ -284,11 +284,15 @@ section! {
         notches: Number (given usize) = Number::log_normal(2.5, 0.9).at_most(14.0), 0..=20;
         /// Number of protrusions of the rim.
         protrusions: Number (given usize) = Number::log_normal(1.5, 0.9).at_most(9.0), 0..=20;
-        /// Number of wrinkles: ridges and pleats. An eighth of them are rolled stretches of the rim.
-        wrinkles: Number (given usize) = Number::log_normal(13.0, 0.6).at_most(60.0), 0..=100;
+        /// Largest additional thickness of narrow ridges, up to 1.4 µm wide, relative to the flat sheet. Ridges rise where
+        /// the sheet stands up along its rim or a fold. With 100 they keep their thickness, as in the paper.
+        ridges: Number (given f64) = 0.25, 0..=100;
+        /// Number of wrinkles: ridges, pleats and bundles of fine ridges. An eighth of them are rolled stretches of the
+        /// rim.
+        wrinkles: Number (given usize) = Number::log_normal(15.0, 0.6).at_most(60.0), 0..=100;
         /// Additional thickness at the crest of a wrinkle, relative to the flat sheet. Rolled stretches of the rim have
         /// 0.4 to 1.6 times this thickness.
-        wrinkle_thickness: Number (given f64) = Number::log_normal(0.2, 0.55).at_most(0.6), 0..=5;
+        wrinkle_thickness: Number (given f64) = Number::log_normal(0.42, 0.6).at_most(1.3), 0..=5;
         /// Width of a wrinkle: standard deviation of its profile. Rolled stretches of the rim have 0.4 to 0.9 µm.
         wrinkle_um: Number (given f64) = Number::uniform(0.25, 1.0), 0.05..=5, "µm";
         /// Additional density and granularity of the cytoplasm around the nucleus, relative to the rest.

@@ -331,6 +331,7 @@ fn draw_detail(recipe: &Recipe, pliability: f64, rng: &mut Stream, own: &impl Fn
         protrusions: random::count(pliable(named!(recipe.cytoplasm.protrusions))),
         wrinkles: random::count(pliable(named!(recipe.cytoplasm.wrinkles))),
         wrinkle_thickness: own(named!(recipe.cytoplasm.wrinkle_thickness)),
+        ridges: own(named!(recipe.cytoplasm.ridges)),
         wrinkle_um: own(named!(recipe.cytoplasm.wrinkle_um)),
         endoplasm: own(named!(recipe.cytoplasm.endoplasm)),
         granules: if granular { granules } else { 0.0 },

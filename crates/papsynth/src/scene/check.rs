@@ -54,7 +54,7 @@ const RANGES: &[(&str, f64, f64)] = &[
     ("elongation", 0.1, 100.0), ("alpha", 0.0, 1.0), ("beta", 0.0, 2.0), ("waves", 0.0, 10.0), ("pallor", 0.0, 1.0),
     ("granularity", 0.0, 20.0), ("ragged", 0.0, 10.0), ("branches", 0.0, 1.0), ("buds", 0.0, 1.0),
     ("density", 0.0, 100.0), ("coverage", 0.0, 1.0), ("excess_area", 1.0, 4.0), ("angularity", 0.0, 1.0), ("degeneration", 0.0, 100.0), ("wrinkle", 0.0, 100.0), ("wrinkle_thickness", 0.0, 100.0),
-    ("endoplasm", 0.0, 100.0), ("clouds", 0.0, 100.0), ("flecks", 0.0, 100.0), ("flecks_threshold", 0.0, 1.0),
+    ("endoplasm", 0.0, 100.0), ("ridges", 0.0, 100.0), ("clouds", 0.0, 100.0), ("flecks", 0.0, 100.0), ("flecks_threshold", 0.0, 1.0),
     ("cytoskeleton", 0.0, 100.0), ("granules", 0.0, 1e4), ("specks", 0.0, 1e4), ("thickness_gradient", -100.0, 100.0),
     ("clearing", 0.0, 1.0), ("depth", 0.0, 2.0), ("curvature", -4.0, 4.0), ("waviness", 0.0, 1.0), ("displacement", 0.0, 1.0), ("dome", 0.0, 1.0), ("clumping", 0.0, 1.0), ("off_centre", -10.0, 10.0),
 ];

@@ -31,12 +31,12 @@ const BEND: f64 = 0.07;
 /// Distance of the points of a frayed rim, µm.
 const RIM_STEP_UM: f64 = 0.7;
 /// Displacement of these points (standard deviation), µm.
-const FRAY_UM: f64 = 0.35;
+const FRAY_UM: f64 = 0.55;
 
 /// Size (standard deviation) relative to the diameter, and strength, of coarse differences of thickness.
-const PATCHES: (f64, f32) = (0.1, 0.18);
+const PATCHES: (f64, f32) = (0.1, 0.35);
 /// Size of the fine structure relative to the grain size, and its strength relative to the contrast of grains.
-const GRAINS: (f64, f64) = (0.6, 0.3);
+const GRAINS: (f64, f64) = (0.6, 1.0);
 
 /// Number of streaks: minimum, and range above it.
 const STREAKS: [usize; 2] = [3, 6];

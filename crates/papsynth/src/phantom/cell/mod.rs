@@ -7,6 +7,7 @@ mod detail;
 mod fine_texture;
 mod halo;
 mod outline;
+mod ridges;
 mod specks;
 mod wrinkles;
 
@@ -33,7 +34,7 @@ const POINTS: usize = 180;
 const SKEW: f64 = 0.45;
 
 /// Waves of a crease: amplitude relative to that of the recipe; shortest and longest wavelength in radii of the cell.
-const WAVES: [[f64; 3]; 2] = [[1.0, 0.8, 1.8], [0.35, 0.3, 0.6]];
+const WAVES: [[f64; 3]; 2] = [[1.0, 0.8, 1.8], [0.2, 0.3, 0.6]];
 
 /// Distance between the points of a roughened rim, µm.
 const RIM_STEP_UM: f64 = 0.375;
@@ -207,6 +208,7 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
                 let thinning = if rim > 0.0 { detail::thinning((1.0 - radius) / rim) } else { 1.0 };
                 interpolate(profile, 1.0 - radius) * thinning
             });
+            ridges::limit_ridges(&mut absorbance, body.detail.ridges, pixel_um);
         }
         None => flat(&mut absorbance, &coverage, profile, plan.centre, body.radius_um / pixel_um),
     }

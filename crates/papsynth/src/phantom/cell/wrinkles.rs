@@ -41,6 +41,18 @@ const FORKED: f64 = 0.35;
 const PLEATS: f64 = 0.5;
 /// Width of a pleat relative to that of a ridge: minimum, maximum.
 const PLEAT_WIDTH: [f64; 2] = [0.8, 2.5];
+/// Fraction of wrinkles that are a bundle of fine ridges side by side: of those that follow the rim, and of others,
+/// rolled stretches of the rim included. These and the next four numbers were set by eye, beside cells of real fields.
+const BUNDLED: [f64; 2] = [0.25, 0.5];
+/// Number of ridges beside the first one of a bundle: minimum, and range above it.
+const BESIDE: [usize; 2] = [1, 3];
+/// Distance between the ridges of a bundle, µm: minimum, maximum.
+const APART_UM: [f64; 2] = [0.9, 2.2];
+/// Width of these ridges (standard deviation of the profile), µm: minimum, maximum.
+const FINE_UM: [f64; 2] = [0.25, 0.5];
+/// Thickness of a ridge beside the first one, relative to it: minimum, maximum.
+const FAINTER: [f64; 2] = [0.4, 1.0];
+
 /// Width of a wrinkle at its ends relative to its middle.
 const END_WIDTH: f64 = 0.4;
 
@@ -85,32 +97,33 @@ impl Wrinkles {
         for _ in 0..detail.wrinkles {
             let rolled = random::chance(ROLLED, rng);
             let others = &wrinkles.others;
-            let path = match random::uniform(rng) {
-                _ if rolled => {
-                    along_rim(outline, &rim, random::between(ROLLED_INSET[0], ROLLED_INSET[1], rng), 0.0, rng)
-                }
-                u if u < ALONG_RIM => {
-                    // Most wrinkles are near the rim, where a thin sheet folds freely.
-                    let depth = random::uniform(rng);
-                    along_rim(outline, &rim, 0.015 + 0.35 * depth * depth, random::between(-0.3, 0.3, rng), rng)
-                }
-                u if u < ALONG_RIM + (1.0 - ALONG_RIM) * FORKED && !others.is_empty() => {
-                    let stem = &others[random::below(others.len(), rng)];
-                    forked(&stem.path, outline, step, rng)
-                }
-                _ => across(outline, step, rng),
+            let follows_rim = !rolled && random::chance(ALONG_RIM, rng);
+            let path = if rolled {
+                along_rim(outline, &rim, random::between(ROLLED_INSET[0], ROLLED_INSET[1], rng), 0.0, rng)
+            } else if follows_rim {
+                // Most wrinkles are near the rim, where a thin sheet folds freely.
+                let depth = random::uniform(rng);
+                along_rim(outline, &rim, 0.015 + 0.35 * depth * depth, random::between(-0.3, 0.3, rng), rng)
+            } else if !others.is_empty() && random::chance(FORKED, rng) {
+                let stem = &others[random::below(others.len(), rng)];
+                forked(&stem.path, outline, step, rng)
+            } else {
+                across(outline, step, rng)
             };
-            let pleat = !rolled && random::chance(PLEATS, rng);
-            let kind = match rolled {
-                true => WrinkleKind { width_um: ROLLED_UM, thickness: ROLLED_THICKNESS, pleat },
-                false => {
-                    let width_um = WIDTH.map(|width| width * detail.wrinkle_um);
-                    WrinkleKind { width_um, thickness: THICKNESS, pleat }
-                }
+            let kind = if rolled {
+                WrinkleKind { width_um: ROLLED_UM, thickness: ROLLED_THICKNESS, pleat: false }
+            } else {
+                let width_um = WIDTH.map(|width| width * detail.wrinkle_um);
+                WrinkleKind { width_um, thickness: THICKNESS, pleat: random::chance(PLEATS, rng) }
             };
-            let profile = WrinkleProfile::new(path.len(), &kind, cell, rng);
             let same = if rolled { &mut wrinkles.rolled } else { &mut wrinkles.others };
-            same.push(Wrinkle { path, profile });
+            if random::chance(BUNDLED[usize::from(!follows_rim)], rng) {
+                let kind = WrinkleKind { width_um: FINE_UM, pleat: false, ..kind };
+                same.extend(bundle(path, &kind, cell, rng));
+            } else {
+                let profile = WrinkleProfile::new(path.len(), &kind, cell, rng);
+                same.push(Wrinkle { path, profile });
+            }
         }
         wrinkles
     }
@@ -136,6 +149,46 @@ impl Wrinkles {
         let distance = points.map(square).fold(far * far, f64::min).sqrt();
         SMOOTH + (1.0 - SMOOTH) * ((distance - near) / (far - near)).max(0.0)
     }
+}
+
+/// Draws a bundle of ridges along a path: the first one on it, others beside it on one side, each along a part of it.
+fn bundle(path: Vec<Point>, kind: &WrinkleKind, cell: &CellContext<'_>, rng: &mut Stream) -> Vec<Wrinkle> {
+    /// Shortest ridge beside the first one, relative to the path.
+    const SHORTEST: f64 = 0.35;
+    /// Change of the distance of a ridge from the first one along the path, relative to its mean.
+    const FAN: f64 = 0.7;
+    let mut first = WrinkleProfile::new(path.len(), kind, cell, rng);
+    let side = if random::chance(0.5, rng) { 1.0 } else { -1.0 };
+    let (strength, mut distance) = (first.strength, 0.0);
+    let mut ridges = Vec::new();
+    for _ in 0..BESIDE[0] + random::below(BESIDE[1], rng) {
+        distance += side * random::between(APART_UM[0], APART_UM[1], rng) / cell.pixel_um();
+        let fan = random::between(-FAN, FAN, rng);
+        let length = random::between(SHORTEST, 1.0, rng);
+        let from = (1.0 - length) * random::uniform(rng);
+        let [start, end] = [from, from + length].map(|at| (at * path.len() as f64) as usize);
+        let path = beside(&path, distance, fan)[start..end.max(start + 2).min(path.len())].to_vec();
+        let profile = WrinkleProfile::new(path.len(), kind, cell, rng);
+        let strength = strength * random::between(FAINTER[0], FAINTER[1], rng);
+        ridges.push(Wrinkle { path, profile: WrinkleProfile { strength, ..profile } });
+    }
+    // The gentle slope of a ridge would fill the gaps of a bundle.
+    first.side = -side;
+    ridges.push(Wrinkle { path, profile: first });
+    ridges
+}
+
+/// Returns a path beside another one, at a distance that changes by the fraction `fan` along it.
+fn beside(path: &[Point], distance: f64, fan: f64) -> Vec<Point> {
+    let last = path.len() - 1;
+    let at = |index: usize| {
+        let [a, b] = [path[index.saturating_sub(1)], path[(index + 1).min(last)]];
+        let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+        let per_length = 1.0 / (dx * dx + dy * dy).sqrt().max(f64::MIN_POSITIVE);
+        let distance = distance * (1.0 + fan * (index as f64 / last as f64 - 0.5));
+        [path[index][0] - distance * dy * per_length, path[index][1] + distance * dx * per_length]
+    };
+    (0..=last).map(at).collect()
 }
 
 /// Returns points at equal steps along a path.
@@ -489,6 +542,20 @@ mod tests {
 
     fn profile(width: f64, side: f64, pleat: bool) -> WrinkleProfile {
         WrinkleProfile { width, pleat, strength: 1.0, side, rise: 0.1, fall: 0.1, factors: vec![1.0; 40] }
+    }
+
+    #[test]
+    fn a_ridge_beside_another_one_has_a_distance_that_changes_along_it() {
+        let path: Vec<Point> = (0..21).map(|i| [2.0 * f64::from(i), 0.0]).collect();
+        for (i, p) in beside(&path, -3.0, 0.5).iter().enumerate() {
+            let t = i as f64 / 20.0;
+            assert!((p[0] - 2.0 * i as f64).abs() < 1e-9 && (p[1] + 3.0 * (0.75 + 0.5 * t)).abs() < 1e-9, "{p:?}");
+        }
+        // Beside a circle is a smaller circle.
+        let circle: Vec<Point> = (0..=90).map(|i| f64::from(i) / 50.0).map(|a| [libm::cos(a), libm::sin(a)]).collect();
+        for p in &beside(&circle, 0.25, 0.0)[1..90] {
+            assert!((libm::hypot(p[0], p[1]) - 0.75).abs() < 1e-9, "{p:?}");
+        }
     }
 
     #[test]
