@@ -258,7 +258,7 @@ section! {
         /// Curvature of a crease times the radius of the cell, bent to either side: 0 is a straight line.
         curvature: Number = Number::uniform(0.10, 0.60), 0..=2;
         /// Amplitude of the longer of two waves of a crease, as a fraction of the radius of the cell.
-        waviness: Number = Number::uniform(0.02, 0.08), 0..=0.5;
+        waviness: Number = Number::uniform(0.03, 0.11), 0..=0.5;
         /// Bending radius of a flap. A rolled rim has twice this radius.
         radius_um: Number = Number::uniform(0.4, 1.2), 0.1..=5, "µm";
     }
@@ -284,8 +284,8 @@ section! {
         notches: Number (given usize) = Number::log_normal(2.5, 0.9).at_most(14.0), 0..=20;
         /// Number of protrusions of the rim.
         protrusions: Number (given usize) = Number::log_normal(1.5, 0.9).at_most(9.0), 0..=20;
-        /// Largest additional thickness of narrow ridges, up to 1.4 µm wide, relative to the flat sheet. Ridges rise where
-        /// the sheet stands up along its rim or a fold. With 100 they keep their thickness, as in the paper.
+        /// Largest additional thickness of narrow ridges, up to 1.4 µm wide, relative to the flat sheet. Ridges rise
+        /// where the sheet stands up along its rim or a fold. With 100 they keep their thickness, as in the paper.
         ridges: Number (given f64) = 0.25, 0..=100;
         /// Number of wrinkles: ridges, pleats and bundles of fine ridges. An eighth of them are rolled stretches of the
         /// rim.

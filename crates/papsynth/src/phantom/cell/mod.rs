@@ -34,7 +34,7 @@ const POINTS: usize = 180;
 const SKEW: f64 = 0.45;
 
 /// Waves of a crease: amplitude relative to that of the recipe; shortest and longest wavelength in radii of the cell.
-const WAVES: [[f64; 3]; 2] = [[1.0, 0.8, 1.8], [0.2, 0.3, 0.6]];
+const WAVES: [[f64; 3]; 2] = [[1.0, 0.8, 1.8], [0.3, 0.3, 0.6]];
 
 /// Distance between the points of a roughened rim, µm.
 const RIM_STEP_UM: f64 = 0.375;

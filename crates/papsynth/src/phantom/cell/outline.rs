@@ -149,6 +149,10 @@ const AMPLITUDE: f64 = 0.37;
 /// Amplitude of the roughness of a scale below a micrometre, relative to that of a few micrometres.
 const FINE_SCALE: f64 = 0.75;
 
+/// Amplitude of waves of about ten micrometres, relative to the depth of the recipe. Rolled stretches of the rim have
+/// them too: without them, some would be straighter than rims of real cells.
+const WAVES: f64 = 0.6;
+
 /// Standard deviation of the logarithm of the roughness along a rim: parts of it are smooth and others torn.
 const UNEVENNESS: f64 = 0.7;
 
@@ -171,6 +175,7 @@ pub(super) fn roughened(
     let step = |state: f64, memory: f64, rng: &mut Stream| {
         memory * state + (1.0 - memory * memory).sqrt() * random::normal(rng)
     };
+    let waves = closed(core::iter::successors(Some(random::normal(rng)), |state| Some(step(*state, 0.96, rng))), count);
     (0..count)
         .map(|i| {
             slow = step(slow, 0.985, rng);
@@ -181,8 +186,31 @@ pub(super) fn roughened(
             let length = (tx * tx + ty * ty).sqrt().max(1e-9);
             let factor = libm::exp(UNEVENNESS * slow - 0.5 * UNEVENNESS * UNEVENNESS);
             let amplitude = AMPLITUDE * factor * roughness(here);
-            let push = depth_px * (amplitude * (FINE_SCALE * fast + medium)).clamp(-2.5, 2.5);
+            let push = depth_px * (amplitude * (FINE_SCALE * fast + medium) + WAVES * waves[i]).clamp(-2.5, 2.5);
             [here[0] + push * ty / length, here[1] - push * tx / length]
         })
         .collect()
+}
+
+/// Returns the first `count` values, inclined so that the last one is followed by the first one.
+fn closed(values: impl Iterator<Item = f64>, count: usize) -> Vec<f64> {
+    let mut values: Vec<f64> = values.take(count + 1).collect();
+    let rise = (values[0] - values[count]) / count as f64;
+    values.iter_mut().enumerate().for_each(|(i, value)| *value += rise * i as f64);
+    values.truncate(count);
+    values
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn closed_waves_have_no_step_from_the_last_value_to_the_first() {
+        assert_eq!(closed((0..9).map(f64::from), 8), vec![0.0; 8]);
+        let wave = |i: i32| libm::sin(0.1 * f64::from(i)) + 0.05 * f64::from(i);
+        let values = closed((0..).map(wave), 40);
+        let steps = (0..40).map(|i| (values[(i + 1) % 40] - values[i]).abs());
+        assert!(steps.fold(0.0, f64::max) < 0.2, "{values:?}");
+    }
 }
