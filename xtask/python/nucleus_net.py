@@ -1,17 +1,15 @@
 """Trains a small U-Net to find nuclei, and tests it on real fields.
 
-    nucleus_net.py --train SET [SET ...] --test FOLDER --out RESULT.json [--unlabelled FOLDER]
-                   [--mask IMAGE MASK] [--steps N] [--seed N] [--weights FILE]
+    nucleus_net.py --train SET [SET ...] --test FOLDER --out RESULT.json [--mask IMAGE MASK] [--steps N] [--seed N]
+                   [--weights FILE]
 
 A SET is a data set of `papsynth generate`, or a folder of data sets, of which the masks of nuclei are learned, or a
 folder of PNG and CSV files with the centres of nuclei (y, x), of which discs are learned. SET:N uses N fields, evenly
 spread over its files. Each batch has equally many crops of all SETs; the last 60 % of the steps use the last SET alone,
 so that a network that learns from synthetic and real fields ends with real ones. In data sets, a part of the crops show
-objects that look like nuclei, and their pixels count as much as those of nuclei. With --unlabelled, the network labels
-the PNG files of a folder itself after half of the steps, and then learns from these and all SETs until the end; pixels
-of which it is not certain do not count.
+objects that look like nuclei, and their pixels count as much as those of nuclei.
 
-Leukocytes that touch a cell do not count either: many cannot be told from nuclei, and a network that learns them as
+Leukocytes that touch a cell do not count: many cannot be told from nuclei, and a network that learns them as
 background misses nuclei near the rims of cells.
 
 The test FOLDER holds real fields with centres and frames.csv with their grades. A nucleus is found if a detection lies
@@ -53,8 +51,6 @@ UNEVEN = 0.03  # standard deviation of the unevenness of light
 NOISE = 0.03  # largest standard deviation of the noise
 AT_CELL = 0.1  # least share of the surroundings of a leukocyte at a cell that are cytoplasm
 SURROUNDINGS = 3  # width of the surroundings, pixels
-CERTAIN = 0.8  # probability that a fifth of the pixels of a nucleus exceed in a field without labels
-BACKGROUND = 0.2  # probability below which pixels are no nuclei
 
 
 def normalized(image):
@@ -183,25 +179,8 @@ def crop(fields, rng):
     return grey + rng.normal(0, rng.uniform(0, NOISE), grey.shape), nuclei, weight
 
 
-def own_labels(net, image):
-    """Return a field whose nuclei are those of which the network is certain; others do not count."""
-    found = probability(net, image)
-    regions, count = ndimage.label(ndimage.binary_opening(found > THRESHOLD, iterations=2))
-    certain = np.zeros(count + 1, bool)
-    for index in range(1, count + 1):
-        inside = found[regions == index]
-        certain[index] = inside.size >= SMALLEST and np.quantile(inside, 0.8) > CERTAIN
-    nuclei = certain[regions]
-    ignored = ~nuclei & (ndimage.maximum_filter(found, 5) >= BACKGROUND)
-    return image, nuclei.astype(np.float32), np.zeros_like(image), ignored.astype(np.float32)
-
-
-def train(sets, steps, seed, unlabelled=()):
-    """Return the trained network.
-
-    Each set gives an equal part of a batch; the last batches are of the last set. If there are images without labels,
-    the network labels them after half of the steps, and all sets are used until the end.
-    """
+def train(sets, steps, seed):
+    """Return the trained network. Each set gives an equal part of a batch; the last batches are of the last set."""
     rng = np.random.default_rng(seed)
     tf.keras.utils.set_random_seed(seed)
     net = network()
@@ -220,9 +199,7 @@ def train(sets, steps, seed, unlabelled=()):
 
     losses = []
     for number in range(steps):
-        if len(unlabelled) and number == steps // 2:
-            sets = [*sets, [own_labels(net, image) for image in unlabelled]]
-        used = sets if len(unlabelled) or number < steps * (1 - LAST) else sets[-1:]
+        used = sets if number < steps * (1 - LAST) else sets[-1:]
         crops = [crop(used[k % len(used)], rng) for k in range(BATCH)]
         images, targets, weights = (np.array(values, np.float32)[..., None] for values in zip(*crops))
         losses.append(float(step(images * CONTRAST, targets, weights)))
@@ -305,7 +282,6 @@ def use_bfloat16():
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--train", nargs="+", required=True)
-    parser.add_argument("--unlabelled", type=Path)
     parser.add_argument("--test", type=Path, required=True)
     parser.add_argument("--mask", nargs=2, type=Path)
     parser.add_argument("--steps", type=int, default=3000)
@@ -317,14 +293,8 @@ def main():
     if not all(sets) or any(min(image.shape) < SIDE for fields in sets for image, *_ in fields):
         parser.error(f"each training set needs at least one field, of at least {SIDE} pixels")
     use_bfloat16()
-    unlabelled = []
-    if options.unlabelled:
-        unlabelled = [normalized(Image.open(file)) for file in sorted(options.unlabelled.glob("*.png"))]
-        if not unlabelled or any(min(image.shape) < SIDE for image in unlabelled):
-            parser.error(f"{options.unlabelled} needs at least one PNG file, of at least {SIDE} pixels")
-    net = train(sets, options.steps, options.seed, unlabelled)
-    arguments = {"train": options.train, "unlabelled": options.unlabelled and str(options.unlabelled)}
-    result = {**arguments, "steps": options.steps, "seed": options.seed, "fields": []}
+    net = train(sets, options.steps, options.seed)
+    result = {"train": options.train, "steps": options.steps, "seed": options.seed, "fields": []}
     for row in csv.DictReader((options.test / "frames.csv").open()):
         file = options.test / f"{row['frame']}.png"
         found = counts(probability(net, normalized(Image.open(file))), centres(file.with_suffix(".csv")))

@@ -53,10 +53,10 @@ const OVERLAP_TESTS: [(&str, &str, &str); 2] = [("extended-focus", "60", "4"), (
 /// Trains a small network on synthetic and on real fields, and tests it on other real fields
 ///
 /// Needs PAPSYNTH_REFERENCE. `papsynth match` fits a recipe to every second real field of each grade; a U-Net is
-/// trained on fields of the three recipes, on those real fields with or without their labels, or on both, and finds the
-/// nuclei of the other half. Then the halves change places. Every training and its weights are written to target/worth,
-/// where an interrupted run continues; a table is printed. Delete target/worth after a change of papsynth. Each
-/// training takes seven minutes on one core; all of them take four hours. docs/WORTH.md tells what was measured.
+/// trained on fields of the three recipes, on those real fields, or on both, and finds the nuclei of the other half.
+/// Then the halves change places. Every training and its weights are written to target/worth, where an interrupted run
+/// continues; a table is printed. Delete target/worth after a change of papsynth. Each training takes eight minutes on
+/// one core; all of them take six hours. docs/WORTH.md tells what was measured.
 ///
 /// With --overlap: trains networks on complete masks of overlapping cells, and tests them on synthetic fields of other
 /// presets. Prints the Dice coefficients of found cells and the share of missed cells. Needs no real fields.
@@ -114,12 +114,12 @@ pub(crate) fn run(workspace: &Workspace, options: &Worth) -> Result<()> {
             WIDEN => "synthetic".to_owned(),
             factor => format!("synthetic_widened_{}", factor.replace('.', "_")),
         };
-        let unlabelled = vec![synthetic.clone(), "--unlabelled".to_owned(), real.clone()];
         // The arguments after `--train` of each row of the table.
         let mut arms = vec![
             (name.clone(), vec![synthetic.clone()]),
-            (format!("{name}_and_unlabelled"), unlabelled),
             ("real".to_owned(), vec![real.clone()]),
+            ("2_real".to_owned(), vec![format!("{real}:2")]),
+            ("4_real".to_owned(), vec![format!("{real}:4")]),
             (format!("{name}_and_2_real"), vec![synthetic.clone(), format!("{real}:2")]),
             (format!("{name}_and_4_real"), vec![synthetic.clone(), format!("{real}:4")]),
             (format!("{name}_and_real"), vec![synthetic, real]),

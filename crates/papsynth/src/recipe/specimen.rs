@@ -285,10 +285,10 @@ section! {
         /// Number of protrusions of the rim.
         protrusions: Number (given usize) = Number::log_normal(1.5, 0.9).at_most(9.0), 0..=20;
         /// Largest additional thickness of narrow ridges, up to 1.4 µm wide, relative to the flat sheet. Ridges rise
-        /// where the sheet stands up along its rim or a fold. With 100 they keep their thickness, as in the paper.
+        /// where the sheet stands up along its rim or a fold. 100 means no limit, as in the paper.
         ridges: Number (given f64) = 0.25, 0..=100;
         /// Number of wrinkles: ridges, pleats and bundles of fine ridges. An eighth of them are rolled stretches of the
-        /// rim.
+        /// rim. Two fifths are bundles, whose ridges have a width of 0.25 to 0.5 µm.
         wrinkles: Number (given usize) = Number::log_normal(15.0, 0.6).at_most(60.0), 0..=100;
         /// Additional thickness at the crest of a wrinkle, relative to the flat sheet. Rolled stretches of the rim have
         /// 0.4 to 1.6 times this thickness.

@@ -78,7 +78,9 @@ fn outline(cell: &CellContext<'_>, class: &ClassAssets, centre: Point) -> Result
     let middle = fsd_shape::centroid(&outline);
     let about = |p: &Point| stretched([p[0] - middle[0], p[1] - middle[1]], cell.body.detail.elongation, rotation);
     let outline: Vec<Point> = outline.iter().map(about).map(|[x, y]| [x + centre[0], y + centre[1]]).collect();
-    Ok(outline::shaped(outline, &cell.body.detail, &mut cell.stream("outline.corners")))
+    let detail = &cell.body.detail;
+    let shaped = outline::shaped(outline, detail, &mut cell.stream("outline.corners"));
+    Ok(outline::wavy(shaped, detail::fray_um(detail), cell.pixel_um(), &mut cell.stream("outline.waves")))
 }
 
 /// Returns the creases along which a cell is folded.

@@ -142,16 +142,43 @@ fn displaced(outline: &[Point], depth: f64, rng: &mut Stream) -> Vec<Point> {
         .collect()
 }
 
+/// Standard deviation of the waves of an outline, relative to the amplitude of irregularities in the recipe.
+const WAVES: f64 = 0.6;
+/// Number of waves of an outline.
+const WAVE_COUNT: usize = 6;
+/// Length of a wave: minimum, maximum, µm.
+const WAVE_UM: [f64; 2] = [8.0, 30.0];
+
+/// Returns the outline with gentle waves. Without them, some cells would have straighter sides than real ones.
+///
+/// `amplitude_um` is the amplitude of irregularities in the recipe.
+pub(super) fn wavy(outline: Vec<Point>, amplitude_um: f64, pixel_um: f64, rng: &mut Stream) -> Vec<Point> {
+    if amplitude_um <= 0.0 {
+        return outline;
+    }
+    let (n, perimeter_um) = (outline.len(), fsd_shape::perimeter(&outline) * pixel_um);
+    let waves: [[f64; 2]; WAVE_COUNT] = core::array::from_fn(|_| {
+        let periods = (perimeter_um / random::between(WAVE_UM[0], WAVE_UM[1], rng)).round();
+        [core::f64::consts::TAU * periods / n as f64, random::direction(rng)]
+    });
+    let amplitude = WAVES * (2.0 / WAVE_COUNT as f64).sqrt() * amplitude_um / pixel_um;
+    let moved = |i: usize| {
+        let [before, here, after] = [outline[(i + n - 1) % n], outline[i], outline[(i + 1) % n]];
+        let (tx, ty) = (after[0] - before[0], after[1] - before[1]);
+        let per_length = 1.0 / (tx * tx + ty * ty).sqrt().max(1e-9);
+        let sum: f64 = waves.iter().map(|[number, phase]| libm::sin(number * i as f64 + phase)).sum();
+        let push = amplitude * sum * per_length;
+        [here[0] + push * ty, here[1] - push * tx]
+    };
+    simple((0..n).map(moved).collect()).unwrap_or(outline)
+}
+
 /// Mean amplitude of the roughness, relative to the depth of the recipe. This and the next two numbers were set so that
 /// displacements of 0.5 to 4 µm are about as large and as uneven as those of real rims.
 const AMPLITUDE: f64 = 0.37;
 
 /// Amplitude of the roughness of a scale below a micrometre, relative to that of a few micrometres.
 const FINE_SCALE: f64 = 0.75;
-
-/// Amplitude of waves of about ten micrometres, relative to the depth of the recipe. Rolled stretches of the rim have
-/// them too: without them, some would be straighter than rims of real cells.
-const WAVES: f64 = 0.6;
 
 /// Standard deviation of the logarithm of the roughness along a rim: parts of it are smooth and others torn.
 const UNEVENNESS: f64 = 0.7;
@@ -175,7 +202,6 @@ pub(super) fn roughened(
     let step = |state: f64, memory: f64, rng: &mut Stream| {
         memory * state + (1.0 - memory * memory).sqrt() * random::normal(rng)
     };
-    let waves = closed(core::iter::successors(Some(random::normal(rng)), |state| Some(step(*state, 0.96, rng))), count);
     (0..count)
         .map(|i| {
             slow = step(slow, 0.985, rng);
@@ -186,31 +212,37 @@ pub(super) fn roughened(
             let length = (tx * tx + ty * ty).sqrt().max(1e-9);
             let factor = libm::exp(UNEVENNESS * slow - 0.5 * UNEVENNESS * UNEVENNESS);
             let amplitude = AMPLITUDE * factor * roughness(here);
-            let push = depth_px * (amplitude * (FINE_SCALE * fast + medium) + WAVES * waves[i]).clamp(-2.5, 2.5);
+            let push = depth_px * (amplitude * (FINE_SCALE * fast + medium)).clamp(-2.5, 2.5);
             [here[0] + push * ty / length, here[1] - push * tx / length]
         })
         .collect()
 }
 
-/// Returns the first `count` values, inclined so that the last one is followed by the first one.
-fn closed(values: impl Iterator<Item = f64>, count: usize) -> Vec<f64> {
-    let mut values: Vec<f64> = values.take(count + 1).collect();
-    let rise = (values[0] - values[count]) / count as f64;
-    values.iter_mut().enumerate().for_each(|(i, value)| *value += rise * i as f64);
-    values.truncate(count);
-    values
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::key::Key;
 
     #[test]
-    fn closed_waves_have_no_step_from_the_last_value_to_the_first() {
-        assert_eq!(closed((0..9).map(f64::from), 8), vec![0.0; 8]);
-        let wave = |i: i32| libm::sin(0.1 * f64::from(i)) + 0.05 * f64::from(i);
-        let values = closed((0..).map(wave), 40);
-        let steps = (0..40).map(|i| (values[(i + 1) % 40] - values[i]).abs());
-        assert!(steps.fold(0.0, f64::max) < 0.2, "{values:?}");
+    fn waves_have_their_amplitude_and_no_step() {
+        // Points of a circle of 25 µm.
+        let circle: Vec<Point> = (0..180)
+            .map(|i| core::f64::consts::TAU * f64::from(i) / 180.0)
+            .map(|angle| [100.0 * libm::cos(angle), 100.0 * libm::sin(angle)])
+            .collect();
+        let (mut squares, mut largest) = (0.0, 0.0_f64);
+        for index in 0..20 {
+            let mut rng = Key { seed: 1, index }.stream("test", 0, "waves");
+            let wavy = wavy(circle.clone(), 0.5, 0.25, &mut rng);
+            let off: Vec<f64> = wavy.iter().map(|p| 0.25 * (libm::hypot(p[0], p[1]) - 100.0)).collect();
+            squares += off.iter().map(|off| off * off).sum::<f64>() / (20.0 * 180.0);
+            // The distance of two points is 0.9 µm.
+            let steps = (0..180).map(|i| (off[(i + 1) % 180] - off[i]).abs());
+            largest = largest.max(steps.fold(0.0, f64::max));
+        }
+        assert!((squares.sqrt() / (WAVES * 0.5) - 1.0).abs() < 0.1, "{squares}");
+        assert!(largest < 0.5, "{largest}");
+        let mut rng = Key { seed: 1, index: 0 }.stream("test", 0, "waves");
+        assert_eq!(wavy(circle.clone(), 0.0, 0.25, &mut rng), circle);
     }
 }

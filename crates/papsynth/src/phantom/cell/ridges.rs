@@ -11,15 +11,16 @@ const NO_LIMIT: f64 = 100.0;
 
 /// Limits the additional thickness of narrow ridges, which rise where a sheet stands up along its rim or a fold, and
 /// along the creases of a fold that is too narrow to be seen. Light microscopes show them as thin, faint lines.
+/// `thickness` is relative to the flat sheet; up to 1, it does not change, so that narrow parts of a cell keep theirs.
 ///
 /// The ridges are the difference between the thickness and its grey-scale opening with a square (white top-hat
 /// transform; Soille, Morphological Image Analysis, 2004, doi:10.1007/978-3-662-05088-0). A difference x becomes
 /// x·L / (x + L), where L is the limit. Wider folds do not change.
 pub(super) fn limit_ridges(thickness: &mut Tile, limit: f64, pixel_um: f64) {
-    if limit >= NO_LIMIT {
+    let radius = (HALF_WIDTH_UM / pixel_um).round() as usize;
+    if limit >= NO_LIMIT || radius == 0 {
         return;
     }
-    let radius = ((HALF_WIDTH_UM / pixel_um).round() as usize).max(1);
     let mut opened = thickness.values.clone();
     fold_squares(&mut opened, thickness.width, radius, minima);
     fold_squares(&mut opened, thickness.width, radius, maxima);
@@ -58,8 +59,10 @@ fn maxima(row: &mut [f32], other: &[f32]) {
 #[multiversion(targets = "simd")]
 fn soften(values: &mut [f32], opened: &[f32], limit: f32) {
     for (value, opened) in values.iter_mut().zip(opened) {
-        let excess = *value - opened;
-        *value = opened + excess * limit / (excess + limit);
+        let flat = if *value < 1.0 { *value } else { 1.0 };
+        let base = if *opened > flat { *opened } else { flat };
+        let excess = *value - base;
+        *value = base + excess * limit / (excess + limit);
     }
 }
 
@@ -87,6 +90,14 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn narrow_parts_of_a_cell_keep_their_thickness() {
+        let protrusion = tile(|x, y| if y > 12 || (8..10).contains(&x) { 0.9 } else { 0.0 });
+        let mut limited = protrusion.clone();
+        limit_ridges(&mut limited, 0.25, 0.35);
+        assert_eq!(limited, protrusion);
     }
 
     #[test]

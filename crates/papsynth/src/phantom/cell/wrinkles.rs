@@ -36,13 +36,14 @@ const WIDTH: [f64; 2] = [0.6, 1.6];
 /// Fraction of the remaining wrinkles that fork off a previous one.
 const FORKED: f64 = 0.35;
 
-/// Fraction of the other wrinkles that are pleats: two dark lines with a paler band between, instead of ridges. This
-/// and the next two numbers were set by eye, beside cells of real fields.
+/// Fraction of the other wrinkles that are pleats, if they are not bundles: two dark lines with a paler band between,
+/// instead of ridges. This and the next two numbers were set by eye, beside cells of real fields.
 const PLEATS: f64 = 0.5;
 /// Width of a pleat relative to that of a ridge: minimum, maximum.
 const PLEAT_WIDTH: [f64; 2] = [0.8, 2.5];
-/// Fraction of wrinkles that are a bundle of fine ridges side by side: of those that follow the rim, and of others,
-/// rolled stretches of the rim included. These and the next four numbers were set by eye, beside cells of real fields.
+/// Fraction of wrinkles that are a bundle of fine ridges side by side, instead of one ridge or pleat: of those that
+/// follow the rim, and of others, rolled stretches of the rim included. These numbers and those of the next four
+/// constants were set by eye, beside cells of real fields.
 const BUNDLED: [f64; 2] = [0.25, 0.5];
 /// Number of ridges beside the first one of a bundle: minimum, and range above it.
 const BESIDE: [usize; 2] = [1, 3];
@@ -116,14 +117,27 @@ impl Wrinkles {
                 let width_um = WIDTH.map(|width| width * detail.wrinkle_um);
                 WrinkleKind { width_um, thickness: THICKNESS, pleat: random::chance(PLEATS, rng) }
             };
-            let same = if rolled { &mut wrinkles.rolled } else { &mut wrinkles.others };
-            if random::chance(BUNDLED[usize::from(!follows_rim)], rng) {
+            let mut ridges = if random::chance(BUNDLED[usize::from(!follows_rim)], rng) {
+                let side = match rolled || follows_rim {
+                    true => side_of(&path, fsd_shape::centroid(outline)),
+                    false => {
+                        if random::chance(0.5, rng) {
+                            1.0
+                        } else {
+                            -1.0
+                        }
+                    }
+                };
                 let kind = WrinkleKind { width_um: FINE_UM, pleat: false, ..kind };
-                same.extend(bundle(path, &kind, cell, rng));
+                bundle(path, side, &kind, cell, rng)
             } else {
                 let profile = WrinkleProfile::new(path.len(), &kind, cell, rng);
-                same.push(Wrinkle { path, profile });
+                vec![Wrinkle { path, profile }]
+            };
+            if rolled {
+                wrinkles.rolled.extend(ridges.pop());
             }
+            wrinkles.others.append(&mut ridges);
         }
         wrinkles
     }
@@ -152,43 +166,57 @@ impl Wrinkles {
 }
 
 /// Draws a bundle of ridges along a path: the first one on it, others beside it on one side, each along a part of it.
-fn bundle(path: Vec<Point>, kind: &WrinkleKind, cell: &CellContext<'_>, rng: &mut Stream) -> Vec<Wrinkle> {
+/// `side` is 1 if they are on the right of the path, where y points down, and −1 if on the left.
+fn bundle(path: Vec<Point>, side: f64, kind: &WrinkleKind, cell: &CellContext<'_>, rng: &mut Stream) -> Vec<Wrinkle> {
     /// Shortest ridge beside the first one, relative to the path.
     const SHORTEST: f64 = 0.35;
-    /// Change of the distance of a ridge from the first one along the path, relative to its mean.
+    /// Largest change of the distance of ridges over the length of the path, relative to its mean.
     const FAN: f64 = 0.7;
     let mut first = WrinkleProfile::new(path.len(), kind, cell, rng);
-    let side = if random::chance(0.5, rng) { 1.0 } else { -1.0 };
-    let (strength, mut distance) = (first.strength, 0.0);
+    // The gentle slope of the first ridge is outside the bundle.
+    first.side = -side;
+    let (fan, mut distance) = (random::between(-FAN, FAN, rng), 0.0);
     let mut ridges = Vec::new();
     for _ in 0..BESIDE[0] + random::below(BESIDE[1], rng) {
         distance += side * random::between(APART_UM[0], APART_UM[1], rng) / cell.pixel_um();
-        let fan = random::between(-FAN, FAN, rng);
-        let length = random::between(SHORTEST, 1.0, rng);
-        let from = (1.0 - length) * random::uniform(rng);
-        let [start, end] = [from, from + length].map(|at| (at * path.len() as f64) as usize);
-        let path = beside(&path, distance, fan)[start..end.max(start + 2).min(path.len())].to_vec();
+        let path = part(&beside(&path, distance, fan), random::between(SHORTEST, 1.0, rng), rng);
         let profile = WrinkleProfile::new(path.len(), kind, cell, rng);
-        let strength = strength * random::between(FAINTER[0], FAINTER[1], rng);
-        ridges.push(Wrinkle { path, profile: WrinkleProfile { strength, ..profile } });
+        let strength = first.strength * random::between(FAINTER[0], FAINTER[1], rng);
+        ridges.push(Wrinkle { path, profile: WrinkleProfile { strength, side, ..profile } });
     }
-    // The gentle slope of a ridge would fill the gaps of a bundle.
-    first.side = -side;
     ridges.push(Wrinkle { path, profile: first });
     ridges
 }
 
-/// Returns a path beside another one, at a distance that changes by the fraction `fan` along it.
+/// Returns a random part of a path: a fraction of its points, at least three of them if it has as many.
+fn part(path: &[Point], fraction: f64, rng: &mut Stream) -> Vec<Point> {
+    let count = ((fraction * path.len() as f64) as usize).max(3).min(path.len());
+    let start = random::below(path.len() - count + 1, rng);
+    path[start..start + count].to_vec()
+}
+
+/// Returns a path beside another one: on its right, where y points down, if the distance is positive. The distance
+/// changes by the fraction `fan` along the path.
 fn beside(path: &[Point], distance: f64, fan: f64) -> Vec<Point> {
     let last = path.len() - 1;
+    let length = super::length(path);
+    // Directions over about twice the distance: a rough path does not fold back beside itself.
+    let span = ((distance.abs() * last as f64 / length.max(f64::MIN_POSITIVE)).ceil() as usize).clamp(1, last.max(1));
     let at = |index: usize| {
-        let [a, b] = [path[index.saturating_sub(1)], path[(index + 1).min(last)]];
+        let [a, b] = [path[index.saturating_sub(span)], path[(index + span).min(last)]];
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
         let per_length = 1.0 / (dx * dx + dy * dy).sqrt().max(f64::MIN_POSITIVE);
         let distance = distance * (1.0 + fan * (index as f64 / last as f64 - 0.5));
         [path[index][0] - distance * dy * per_length, path[index][1] + distance * dx * per_length]
     };
     (0..=last).map(at).collect()
+}
+
+/// Returns the side of a path on which a point lies, 1 or −1, as in [`bundle`].
+fn side_of(path: &[Point], point: Point) -> f64 {
+    let (first, last, middle) = (path[0], path[path.len() - 1], path[path.len() / 2]);
+    let cross = (last[0] - first[0]) * (point[1] - middle[1]) - (last[1] - first[1]) * (point[0] - middle[0]);
+    1.0_f64.copysign(cross)
 }
 
 /// Returns points at equal steps along a path.
@@ -539,6 +567,7 @@ fn add_and_clear(thickness: &mut [f32], cover: &[f32], painted: &mut [f32]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::key::Key;
 
     fn profile(width: f64, side: f64, pleat: bool) -> WrinkleProfile {
         WrinkleProfile { width, pleat, strength: 1.0, side, rise: 0.1, fall: 0.1, factors: vec![1.0; 40] }
@@ -551,10 +580,34 @@ mod tests {
             let t = i as f64 / 20.0;
             assert!((p[0] - 2.0 * i as f64).abs() < 1e-9 && (p[1] + 3.0 * (0.75 + 0.5 * t)).abs() < 1e-9, "{p:?}");
         }
+        assert_eq!((side_of(&path, [9.0, 5.0]), side_of(&path, [9.0, -5.0])), (1.0, -1.0));
         // Beside a circle is a smaller circle.
         let circle: Vec<Point> = (0..=90).map(|i| f64::from(i) / 50.0).map(|a| [libm::cos(a), libm::sin(a)]).collect();
-        for p in &beside(&circle, 0.25, 0.0)[1..90] {
+        for p in &beside(&circle, 0.25, 0.0)[20..70] {
             assert!((libm::hypot(p[0], p[1]) - 0.75).abs() < 1e-9, "{p:?}");
+        }
+    }
+
+    #[test]
+    fn a_ridge_beside_a_rough_path_goes_forward() {
+        let mut rng = Key { seed: 3, index: 0 }.stream("test", 0, "path");
+        for distance in [2.0, 8.0, 20.0] {
+            let path: Vec<Point> = (0..120).map(|i| [1.5 * f64::from(i), 0.6 * random::normal(&mut rng)]).collect();
+            let ridge = beside(&path, distance, 0.0);
+            // Every third point is the end of a segment.
+            let backwards = ridge.windows(4).filter(|p| p[3][0] < p[0][0]).count();
+            assert!(backwards == 0, "{backwards} of {} segments at {distance} px", ridge.len() - 3);
+        }
+    }
+
+    #[test]
+    fn a_part_of_a_path_has_its_fraction_of_points_and_at_least_three() {
+        let mut rng = Key { seed: 3, index: 0 }.stream("test", 0, "part");
+        for (count, fraction, expected) in [(4, 0.35, 3), (40, 0.5, 20), (40, 1.0, 40), (2, 0.5, 2)] {
+            let path: Vec<Point> = (0..count).map(|i| [f64::from(i), 0.0]).collect();
+            let part = part(&path, fraction, &mut rng);
+            assert_eq!(part.len(), expected);
+            assert!(part.windows(2).all(|p| p[1][0] - p[0][0] == 1.0), "{part:?}");
         }
     }
 
