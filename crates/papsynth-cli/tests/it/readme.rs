@@ -155,7 +155,7 @@ fn exposures(bench: &Bench, name: &str, electrons: &[f32]) {
 
 /// A folder of images without ground truth.
 fn images(bench: &Bench, name: &str, seed: u32) {
-    bench.good(&format!("generate --out made-{name} --frames 4 --seed {seed} --quiet {NUCLEI}"));
+    bench.good(&format!("generate --out made-{name} --frames 6 --seed {seed} --quiet {NUCLEI}"));
     fs::rename(bench.path(&format!("made-{name}/images")), bench.path(name)).unwrap();
 }
 
