@@ -29,6 +29,9 @@ impl Stroke {
     }
 }
 
+/// Mean of the absolute value of a standard normal number: √(2/π).
+const MEAN_ABS: f32 = 0.797_884_6;
+
 impl ObjectCanvas {
     /// Creates an empty canvas around points, with a margin in pixels.
     pub(super) fn around<'a>(points: impl IntoIterator<Item = &'a Point>, margin: f64) -> Self {
@@ -116,6 +119,16 @@ impl ObjectCanvas {
         self.rows(noise_field, sampler, |_, _, values, field| {
             for (value, field) in values.iter_mut().zip(field) {
                 *value *= (1.0 + strength * field).max(0.0);
+            }
+        });
+    }
+
+    /// Multiplies the absorbance by max(1 + strength · (m − |field|), 0), where m is the mean of |field|. This draws
+    /// dark walls between pale vacuoles.
+    pub(super) fn foam(&mut self, noise_field: &NoiseField, sampler: &FieldSampler, strength: f32) {
+        self.rows(noise_field, sampler, |_, _, values, field| {
+            for (value, field) in values.iter_mut().zip(field) {
+                *value *= (1.0 + strength * (MEAN_ABS - field.abs())).max(0.0);
             }
         });
     }
@@ -213,6 +226,7 @@ fn smaller(a: f32, b: f32) -> f32 {
 mod tests {
     use super::*;
     use crate::key::Key;
+    use crate::phantom::noise_fields::NoiseFieldGenerator;
     use crate::random;
 
     /// Returns the fraction of a pixel that a stroke covers.
@@ -253,6 +267,25 @@ mod tests {
                 assert!((f64::from(*value) - absorbance).abs() < 2e-5, "{stroke:?} {p:?}: {value} {absorbance}");
             });
         }
+    }
+
+    #[test]
+    fn foam_keeps_the_mean_and_is_darkest_where_the_field_is_zero() {
+        let key = Key { seed: 4, index: 0 };
+        let (generator, mut rng) = (NoiseFieldGenerator::new(), key.stream("test", 0, "foam"));
+        let (fields, sampler) = (generator.fields(key), FieldSampler::clouds(2.0, &mut rng));
+        let mut canvas = ObjectCanvas::around(&[[0.0, 0.0], [400.0, 300.0]], 0.0);
+        canvas.absorbance.values.fill(0.1);
+        canvas.foam(fields.clouds(), &sampler, 0.5);
+        let mean = canvas.absorbance.values.iter().sum::<f32>() / canvas.absorbance.values.len() as f32;
+        assert!((mean - 0.1).abs() < 0.004, "{mean}");
+        canvas.rows(fields.clouds(), &sampler, |_, _, values, field| {
+            let pairs = || values.iter().zip(field);
+            let darkest = 0.1 * (1.0 + 0.5 * MEAN_ABS);
+            assert!(
+                pairs().all(|(value, field)| *value <= darkest && (field.abs() > 0.05) == (*value < darkest - 0.0025))
+            );
+        });
     }
 
     #[test]

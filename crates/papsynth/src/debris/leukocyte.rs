@@ -48,7 +48,7 @@ section! {
         /// Shape of the nucleus.
         form: NucleusForm = NucleusForm::Lobed;
         /// Radius of the nucleus (s of Eq. 7); for a lobed nucleus, radius of a disc of the same area.
-        radius_um: Number = Number::normal(4.1, 0.45).at_least(2.6), 0.3..=20, "µm";
+        radius_um: Number = Number::normal(4.4, 0.5).at_least(2.8), 0.3..=20, "µm";
         /// Range of the radial perturbation (α of Eq. 7).
         alpha: Number = 0.10, 0..=0.5;
         /// Range of the angular perturbation (β of Eq. 7).
@@ -56,7 +56,7 @@ section! {
         /// Lobes of a lobed nucleus.
         lobes: Count = Number::choice([1.0, 1.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 4.0]), 1..=8;
         /// Diameter of the cytoplasm of a lobed leukocyte.
-        cytoplasm_diameter_um: Number = Number::normal(11.6, 1.5).at_least(7.0), 1..=100, "µm";
+        cytoplasm_diameter_um: Number = Number::normal(12.4, 1.7).at_least(7.0), 1..=100, "µm";
         /// Probability that a lobed leukocyte is degenerated, with a smudged or pyknotic nucleus and frayed cytoplasm.
         degenerated: Number = 0.45, 0..=1;
         /// Fraction of the degenerated leukocytes whose nucleus is pyknotic: small and dark, without structure.
@@ -68,7 +68,7 @@ section! {
         /// Absorbance of the nucleus, before the nuclear stain factor of the field.
         absorbance: Number = Number::normal(0.29, 0.06).at_least(0.1), 0..=4;
         /// Absorbance of the cytoplasm.
-        cytoplasm_absorbance: Number = Number::log_normal(0.14, 0.5), 0..=4;
+        cytoplasm_absorbance: Number = Number::log_normal(0.13, 0.4), 0..=4;
     }
 }
 
@@ -160,13 +160,13 @@ impl Leukocytes {
             let [radius, absorbance] = [HISTIOCYTE_RADIUS, HISTIOCYTE_ABSORBANCE];
             return Variant { form: NucleusForm::Kidney, radius, absorbance, cytoplasm_diameter_um, ..intact };
         }
-        let ([radius, absorbance], pyknotic) = match (degenerated, pyknotic) {
+        let ([radius, absorbance], pyknotic, lobes) = match (degenerated, pyknotic) {
             (false, _) => return intact,
-            (true, true) => ([PYKNOTIC_RADIUS, PYKNOTIC_ABSORBANCE], true),
-            (true, false) => ([SMUDGED_RADIUS, SMUDGED_ABSORBANCE], false),
+            (true, true) => ([PYKNOTIC_RADIUS, PYKNOTIC_ABSORBANCE], true, 1),
+            (true, false) => ([SMUDGED_RADIUS, SMUDGED_ABSORBANCE], false, lobes),
         };
         let [radius, absorbance] = [radius, absorbance].map(|range| random::between(range[0], range[1], rng));
-        Variant { lobes: 1, radius, absorbance, degenerated, pyknotic, ..intact }
+        Variant { lobes, radius, absorbance, degenerated, pyknotic, ..intact }
     }
 }
 
@@ -225,7 +225,7 @@ const MIN_DISTANCE: f64 = 1.5;
 const MAX_TRIES: usize = 24;
 /// Distance of touching leukocytes, relative to the diameter of their cytoplasm: minimum, maximum. They flatten and
 /// overlap each other.
-const TOUCHING: [f64; 2] = [0.6, 1.05];
+const TOUCHING: [f64; 2] = [0.56, 0.98];
 /// Number of touching positions that are drawn. The one closest to the centre of the cluster is used, which makes
 /// clumps compact.
 const NEIGHBOURS: usize = 2;

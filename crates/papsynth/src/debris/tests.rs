@@ -406,8 +406,8 @@ fn clumps_of_leukocytes_are_compact_and_their_members_touch() {
         let mut nearest = Vec::new();
         for (i, (_, at, body)) in members.iter().enumerate().skip(1) {
             let before = members[..i].iter().map(|(_, other, _)| square(*at, *other).sqrt()).fold(f64::MAX, f64::min);
-            assert!(before <= 1.05 * body.cytoplasm_diameter_um + 1e-9, "{before}");
-            apart += usize::from(before >= 0.6 * body.cytoplasm_diameter_um - 1e-9);
+            assert!(before <= 0.98 * body.cytoplasm_diameter_um + 1e-9, "{before}");
+            apart += usize::from(before >= 0.56 * body.cytoplasm_diameter_um - 1e-9);
             nearest.push(before);
         }
         assert!(apart >= 20, "{apart} of 23 have a minimum distance");

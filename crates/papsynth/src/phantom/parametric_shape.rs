@@ -48,7 +48,7 @@ pub(crate) fn make_irregular<R: Rng + ?Sized>(outline: &mut [Point], strength: f
         let scale = (1.0 + push).clamp(0.6, 1.4);
         (*x, *y) = (*x * scale, *y * scale);
     }
-    let scale = (before / area(outline).abs().max(f64::MIN_POSITIVE)).sqrt();
+    let scale = (before / area(outline).abs().max(f64::MIN_POSITIVE)).sqrt().clamp(0.5, 2.0);
     for point in outline {
         *point = point.map(|v| v * scale);
     }

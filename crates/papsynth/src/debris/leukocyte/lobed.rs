@@ -50,22 +50,23 @@ const BRIDGE: f64 = 0.5;
 /// edges than the flat nuclei of epithelial cells. Set by eye beside real fields, as the numbers of clefts below.
 const RIM: [f64; 2] = [0.1, 0.6];
 
-/// Irregularity of the outline of a pyknotic nucleus: standard deviation of the second harmonic.
-const IRREGULAR: f64 = 0.06;
+/// Irregularity of the outline of a lobe, standard deviation of the second harmonic: minimum, maximum.
+const IRREGULAR: [f64; 2] = [0.05, 0.16];
 
 /// Contrast of the chromatin of an intact nucleus: minimum, maximum.
-const CHROMATIN: [f64; 2] = [0.05, 0.18];
+const CHROMATIN: [f64; 2] = [0.06, 0.22];
 /// Contrast of the chromatin of a smudged nucleus.
 const SMUDGED: f64 = 0.2;
 /// Contrast of the chromatin of a pyknotic nucleus.
 const PYKNOTIC: f64 = 0.03;
-/// Contrast of the vacuoles of a cytoplasm: minimum, maximum.
-const VACUOLES: [f64; 2] = [0.05, 0.3];
-/// Contrast of the vacuoles of a histiocyte.
-const FOAM: f64 = 0.5;
+/// Strength of the vacuoles of a cytoplasm: minimum, maximum. The relative standard deviation of the absorbance is 0.6
+/// times this number.
+const VACUOLES: [f64; 2] = [0.1, 0.5];
+/// Strength of the vacuoles of a histiocyte.
+const FOAM: f64 = 0.8;
 
-/// Remains of the lobes of a smudged nucleus, with pale clefts between them: fewest and most.
-const SMUDGED_LOBES: [usize; 2] = [1, 4];
+/// Parts of a smudged nucleus of one lobe, with pale clefts between them: fewest and most.
+const SMUDGED_PARTS: [usize; 2] = [1, 4];
 /// Relative decrease of absorbance in a cleft: minimum, maximum.
 const CLEFT: [f64; 2] = [0.1, 0.4];
 /// Width (standard deviation) of a cleft, µm.
@@ -73,13 +74,14 @@ const CLEFT_UM: f64 = 0.35;
 
 /// Size (standard deviation) of clumps of chromatin, µm.
 const CLUMP_UM: f64 = 0.45;
-/// Size (standard deviation) of vacuoles, µm: minimum, maximum.
-const VACUOLE_UM: [f64; 2] = [0.25, 0.45];
+/// Smoothing (standard deviation) of the noise field of vacuoles, µm: minimum, maximum. Walls are 4.4 times this number
+/// apart on average.
+const VACUOLE_UM: [f64; 2] = [0.3, 0.6];
 
 /// Width of the darker border of a cytoplasm, µm.
 const BORDER_UM: f64 = 0.5;
 /// Relative increase of absorbance in the border: minimum, maximum.
-const BORDER: [f64; 2] = [0.0, 0.25];
+const BORDER: [f64; 2] = [0.0, 0.7];
 /// Absorbance at the edge of a cytoplasm relative to its centre, from a sphere to a flat disc: minimum, maximum.
 /// Independent of that of the nucleus.
 const FLATNESS: [f64; 2] = [0.0, 0.9];
@@ -103,13 +105,12 @@ pub(super) fn make(leukocyte: &Leukocyte, context: &ObjectContext<'_>) -> Phanto
     let shift = -0.35 * tail * cell_radius + 0.1 * cell_radius * random::normal(&mut rng);
     let at = [shift * libm::cos(toward), shift * libm::sin(toward)];
     let outline = context.curve_to_grid(&body);
+    let irregular = random::between(IRREGULAR[0], IRREGULAR[1], &mut rng);
     let shapes: Vec<Vec<Point>> = lobes
         .iter()
         .map(|lobe| {
             let mut shape = perturbed_circle(lobe.radius, leukocyte.alpha, leukocyte.beta, &mut rng);
-            if leukocyte.pyknotic {
-                make_irregular(&mut shape, IRREGULAR, &mut rng);
-            }
+            make_irregular(&mut shape, irregular, &mut rng);
             let stretch = |p: &Point| [p[0] * lobe.stretch, p[1] / lobe.stretch];
             let turned = shape.iter().map(|p| placed(stretch(p), lobe.heading, lobe.centre));
             turned.map(|p| context.to_grid([p[0] + at[0], p[1] + at[1]])).collect()
@@ -123,16 +124,16 @@ pub(super) fn make(leukocyte: &Leukocyte, context: &ObjectContext<'_>) -> Phanto
     let mut canvas = context.canvas(&points, SOFT_REACH * softness_um);
     canvas.coverage.cover(&outline);
     shade_cytoplasm(&mut canvas, &outline, leukocyte, context, &mut rng);
-    if let Some(remains) = &remains {
-        add_remains(remains, &mut canvas, context, &mut rng);
-    }
     let vacuoles = match leukocyte.form {
         NucleusForm::Kidney => FOAM,
         NucleusForm::Lobed | NucleusForm::Round => random::between(VACUOLES[0], VACUOLES[1], &mut rng),
     };
     let vacuole_um = random::between(VACUOLE_UM[0], VACUOLE_UM[1], &mut rng);
     let sampler = FieldSampler::clouds(context.px(vacuole_um), &mut rng);
-    canvas.texture(context.noise_fields.clouds(), &sampler, vacuoles as f32);
+    canvas.foam(context.noise_fields.clouds(), &sampler, vacuoles as f32);
+    if let Some(remains) = &remains {
+        add_remains(remains, &mut canvas, context, &mut rng);
+    }
 
     let mut nucleus = canvas.blank();
     for shape in &shapes {
@@ -147,7 +148,7 @@ pub(super) fn make(leukocyte: &Leukocyte, context: &ObjectContext<'_>) -> Phanto
     let rim = random::between(RIM[0], RIM[1], &mut rng);
     domed(&mut nucleus, &shapes, leukocyte.absorbance, rim);
     if smudged {
-        let clefts = Clefts::new(at, lobes[0].radius, context, &mut rng);
+        let clefts = Clefts::new(at, &lobes, context, &mut rng);
         nucleus.absorbance.for_each(|p, value| *value *= clefts.factor(p));
     }
     let chromatin = match (leukocyte.pyknotic, leukocyte.degenerated) {
@@ -167,7 +168,9 @@ pub(super) fn make(leukocyte: &Leukocyte, context: &ObjectContext<'_>) -> Phanto
         }
         canvas.coverage.values.iter_mut().for_each(|cover| *cover = cover.min(1.0));
     }
-    crop(&mut canvas, context, context.px(leukocyte.reach_um(context.pixel_um)));
+    let reach = context.px(leukocyte.reach_um(context.pixel_um));
+    crop(&mut canvas, context, reach);
+    crop(&mut nucleus, context, reach);
     let mut phantom = canvas
         .into_phantom(leukocyte.dyes, 0.0, leukocyte.cytoplasm_absorbance)
         .with_inclusion(nucleus.absorbance, context.dyes.nucleus);
@@ -326,9 +329,9 @@ fn add_remains(remains: &Tuft, canvas: &mut ObjectCanvas, context: &ObjectContex
     covers.for_each(|(cover, other)| *cover = cover.max(*other));
 }
 
-/// Pale clefts between the remains of the lobes of a smudged nucleus, midway between their centres.
+/// Pale clefts of a smudged nucleus, midway between the centres of its parts.
 struct Clefts {
-    /// Centres of the remains, px.
+    /// Centres of the parts, px.
     centres: Vec<Point>,
     /// Relative decrease of absorbance.
     depth: f64,
@@ -337,18 +340,23 @@ struct Clefts {
 }
 
 impl Clefts {
-    /// Draws the clefts of a nucleus with this centre and radius, µm.
-    fn new(at: Point, radius: f64, context: &ObjectContext<'_>, rng: &mut Stream) -> Self {
-        /// Largest distance of the centre of remains from that of the nucleus, in its radii.
+    /// Returns the clefts between the lobes of a nucleus at `at`, µm, or draws them for a nucleus of one lobe.
+    fn new(at: Point, lobes: &[Lobe], context: &ObjectContext<'_>, rng: &mut Stream) -> Self {
+        /// Largest distance of the centre of a part from that of the lobe, in its radii.
         const REACH: f64 = 0.8;
-        let count = SMUDGED_LOBES[0] + random::below(SMUDGED_LOBES[1] - SMUDGED_LOBES[0] + 1, rng);
-        let centres = (0..count)
-            .map(|_| {
-                let (distance, direction) = (REACH * radius * random::uniform(rng).sqrt(), random::direction(rng));
-                let [x, y] = [distance * libm::cos(direction), distance * libm::sin(direction)];
-                context.to_grid([at[0] + x, at[1] + y])
-            })
-            .collect();
+        let centres: Vec<Point> = match lobes {
+            [lobe] => {
+                let count = SMUDGED_PARTS[0] + random::below(SMUDGED_PARTS[1] - SMUDGED_PARTS[0] + 1, rng);
+                let part = |_| {
+                    let distance = REACH * lobe.radius * random::uniform(rng).sqrt();
+                    let direction = random::direction(rng);
+                    [distance * libm::cos(direction), distance * libm::sin(direction)]
+                };
+                (0..count).map(part).collect()
+            }
+            lobes => lobes.iter().map(|lobe| lobe.centre).collect(),
+        };
+        let centres = centres.iter().map(|[x, y]| context.to_grid([at[0] + x, at[1] + y])).collect();
         Self { centres, depth: random::between(CLEFT[0], CLEFT[1], rng), width: context.px(CLEFT_UM) }
     }
 
@@ -387,7 +395,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn clefts_are_palest_midway_between_remains() {
+    fn clefts_are_palest_midway_between_parts() {
         let clefts = Clefts { centres: vec![[0.0, 0.0], [10.0, 0.0], [4.0, 30.0]], depth: 0.4, width: 2.0 };
         assert!((clefts.factor([5.0, 2.0]) - 0.6).abs() < 1e-6);
         assert!(clefts.factor([4.0, 0.0]) > clefts.factor([5.0, 0.0]));
