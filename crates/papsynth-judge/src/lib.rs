@@ -7,6 +7,7 @@ mod describe;
 mod error;
 #[doc(hidden)]
 pub mod filter;
+mod forest;
 mod html;
 mod image;
 mod judge;
