@@ -6,6 +6,8 @@ mod cli;
 mod hostile;
 #[cfg(feature = "judge")]
 mod judge;
+#[cfg(feature = "learn")]
+mod learn;
 #[cfg(not(all(
     feature = "calibrate",
     feature = "completions",
