@@ -518,7 +518,7 @@ class Cytoplasm(Section):
 
     texture: Number | None = None
     """Factor on the strength of the fine texture of the cytoplasm in the model: grains, networks and fibres. The
-    default gives the spectrum inside cells of real fields. From 0 to 20.
+    default gives about the spectrum inside cells of real low-grade fields. From 0 to 20.
     """
 
     granular: Number | None = None

@@ -313,7 +313,7 @@ section! {
         /// Amplitude of the third level of detail, the cytoskeleton, relative to the absorbance of the cytoplasm.
         cytoskeleton: Number = Number::uniform(0.05, 0.18), 0..=2;
         /// Factor on the strength of the fine texture of the cytoplasm in the model: grains, networks and fibres. The
-        /// default gives the spectrum inside cells of real fields.
+        /// default gives about the spectrum inside cells of real low-grade fields.
         texture: Number
             (given f64 as texture: "Standard deviation of the fine texture, relative to the absorbance of the cytoplasm.")
             = 0.8, 0..=20;
