@@ -38,6 +38,7 @@ REACH = 12  # largest distance of a detection from a nucleus, pixels
 THRESHOLD = 0.7  # probability of detections, chosen on the half of the fields that a recipe is matched to
 MASK_THRESHOLD = 0.5  # probability of masks
 SMALLEST = 60  # area of a detection, pixels
+MIN_EMPTY = 50  # pixels of the empty slide, in an eighth of the resolution, for which its light is fitted
 SCALES = (1.0, 1.2)  # of the image with a mask, whose pixel size is not known
 CHANNELS = 12  # of the first level of the network
 CONTRAST = 4.0  # factor on the images
@@ -56,8 +57,27 @@ SURROUNDINGS = 3  # width of the surroundings, pixels
 def normalized(image):
     """Return the light relative to the empty slide, minus 1."""
     grey = np.asarray(image.convert("L") if image.mode in ("RGB", "RGBA", "P") else image, dtype=np.float32)
-    empty = np.quantile(ndimage.zoom(grey, 0.125, order=1), 0.97)
-    return np.clip(grey / empty, 0, 1.3) - 1
+    return np.clip(grey / empty_slide(grey), 0, 1.3) - 1
+
+
+def empty_slide(grey):
+    """Return the light of the empty slide at each pixel: a quadratic surface through the bright parts of the image.
+
+    Where light is uneven, the dim parts of the empty slide would otherwise look like pale cytoplasm.
+    """
+    small = ndimage.zoom(grey, 0.125, order=1)
+    brightest = np.quantile(small, 0.97)
+    y, x = np.meshgrid(*(np.linspace(-1, 1, size) for size in small.shape), indexing="ij")
+    terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1)
+    surface = np.full_like(small, brightest)
+    bright = small > 0.9 * brightest
+    for _ in range(10):
+        if bright.sum() < MIN_EMPTY:
+            break
+        surface = terms @ np.linalg.lstsq(terms[bright], small[bright], rcond=None)[0]
+        bright = (np.abs(small / surface - 1.01) < 0.04) & (small > 0.85 * brightest)
+    size = [full / part for full, part in zip(grey.shape, small.shape)]
+    return ndimage.zoom(np.clip(surface, 0.85 * brightest, 1.05 * brightest), size, order=1)
 
 
 def centres(file):

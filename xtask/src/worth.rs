@@ -18,8 +18,15 @@ const PACKAGES: &str = "numpy\npillow\nscipy\n\
 /// Number of fields generated for each grade and each of [`LEUKOCYTES`].
 const FRAMES: &str = "40";
 
-/// Change of the matched recipes for training: more degenerated cells (docs/WORTH.md).
-const DEGENERATION: &str = "cytoplasm.degeneration={ log_normal = [0.3, 1], max = 2 }";
+/// Changes of the matched recipes for training, beside `--widen`: more variety of cells (docs/WORTH.md).
+const VARIETY: [&str; 6] = [
+    "cytoplasm.degeneration={ log_normal = [0.3, 1], max = 2 }",
+    "cytoplasm.clouds={ uniform = [0.03, 0.25] }",
+    "cytoplasm.elongation={ log_normal = [1.2, 0.45], min = 0.4, max = 4 }",
+    "cytoplasm.folds.folded_over=0.12",
+    "nucleus.rim={ uniform = [0, 0.5] }",
+    "stain.nucleus_variation=1.3",
+];
 
 /// Changes of the leukocytes, which look like nuclei: clusters, and more that lie alone on the empty slide.
 const LEUKOCYTES: [(&str, &[&str]); 2] = [
@@ -38,10 +45,10 @@ const LEUKOCYTES: [(&str, &[&str]); 2] = [
 const WIDEN: &str = "1.5";
 
 /// Version of `nucleus_net.py`: results of another version are kept apart.
-const METHOD: u32 = 5;
+const METHOD: u32 = 6;
 
 /// Version of `overlap_net.py` and of its sets: results of another version are kept apart.
-const OVERLAP_METHOD: u32 = 2;
+const OVERLAP_METHOD: u32 = 3;
 
 /// Presets of the overlapping cells on which networks are trained: name, number of fields and seed.
 const OVERLAP_TRAINING: [(&str, &str, &str); 3] =
@@ -206,9 +213,9 @@ fn synthetic(workspace: &Workspace, folder: &Path, real: &Path, half: usize, wid
             // With one seed for all, the data sets would have the same scenes.
             let seed = (GRADES.len() * (2 * set + half) + number).to_string();
             let words = ["--frames", FRAMES, "--seed", &seed, "--widen", widen, "--set", "slide.fields_per_slide=1"];
-            let words =
-                words.into_iter().chain(["--without", "noise-free,layers,contact-sheet", "--set", DEGENERATION]);
-            let words = words.chain(leukocytes.iter().flat_map(|set| ["--set", *set])).map(PathBuf::from);
+            let words = words.into_iter().chain(["--without", "noise-free,layers,contact-sheet"]);
+            let sets = VARIETY.iter().chain(leukocytes).flat_map(|set| ["--set", *set]);
+            let words = words.chain(sets).map(PathBuf::from);
             let out = partial.join(format!("{grade}-{name}"));
             dataset::generate(program(workspace), &out, [recipe.clone()].into_iter().chain(words))?;
         }

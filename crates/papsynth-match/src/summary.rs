@@ -152,9 +152,7 @@ impl Summary {
         for (name, value) in scalars(s) {
             all.put(name, value);
         }
-        // The power of windows inside cells depends on the number of layers; the texture below does not.
-        let in_windows = papsynth_judge::CYTOPLASM_NAMES.into_iter().zip(s.cytoplasm);
-        for (name, value) in in_windows.filter(|(name, _)| !name.starts_with("cytoplasm power")) {
+        for (name, value) in papsynth_judge::CYTOPLASM_NAMES.into_iter().zip(s.cytoplasm) {
             all.put(name, value);
         }
         for (i, power) in s.spectrum.iter().enumerate() {

@@ -517,9 +517,12 @@ class Cytoplasm(Section):
     """
 
     texture: Number | None = None
-    """Factor on the strength of the fine texture of the cytoplasm in the model: grains, networks and fibres. The
-    default gives about the spectrum inside cells of real low-grade fields. From 0 to 20.
+    """Factor on the strength of the fine texture of the cytoplasm in the model: grains, networks and fibres. Matched to
+    24 real fields, it is 0.43 to 1.04, with a median of 0.61. From 0 to 20.
     """
+
+    texture_size: Number | None = None
+    """Factor on the sizes of the fine texture of the cytoplasm. Its strength stays the same. From 0.2 to 5."""
 
     granular: Number | None = None
     """Probability that a cell is granular. From 0 to 1."""
@@ -1459,8 +1462,8 @@ class Stain(Section):
 
     texture_variation: Number | None = None
     """Factor by which the standard deviations of the strength of the fine texture of cytoplasm, between cells and
-    between fields, are multiplied. Drawn once per field. Those of the model are measured on small areas, which also
-    differ within a cell. From 0 to 5.
+    between fields, are multiplied. Drawn once per field. The outer and the inner cytoplasm of a cell have a strength
+    each. From 0 to 5.
     """
 
     slide_balance: Number | None = None

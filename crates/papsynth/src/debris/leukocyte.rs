@@ -212,7 +212,7 @@ const PYKNOTIC_RADIUS: [f64; 2] = [0.6, 0.9];
 /// Absorbance of a pyknotic nucleus relative to an intact one: minimum, maximum.
 const PYKNOTIC_ABSORBANCE: [f64; 2] = [1.1, 1.4];
 /// Radius of a smudged nucleus relative to an intact one: minimum, maximum.
-const SMUDGED_RADIUS: [f64; 2] = [0.9, 1.2];
+const SMUDGED_RADIUS: [f64; 2] = [0.9, 1.35];
 /// Absorbance of a smudged nucleus relative to an intact one: minimum, maximum.
 const SMUDGED_ABSORBANCE: [f64; 2] = [0.55, 0.95];
 

@@ -75,7 +75,8 @@ impl TexturePools {
         Ok(self.pools[index].get_or_init(|| Pool::new(&texels)))
     }
 
-    /// Draws a place, a direction, a mirroring and a stretch. `pixel_um` is the size of the pixels that are drawn.
+    /// Draws a place, a direction, a mirroring and a stretch. `pixel_um` is the size of the pixels that are drawn,
+    /// relative to that of the texture.
     pub(crate) fn sampler<R: Rng + ?Sized>(&self, pixel_um: f64, rng: &mut R) -> PoolSampler {
         let step = pixel_um / self.texture.pixel_um;
         let [angle, stretched] = [0, 1].map(|_| random::direction(rng));

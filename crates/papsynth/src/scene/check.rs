@@ -47,7 +47,7 @@ const RANGES: &[(&str, f64, f64)] = &[
     ("fold.radius_um", 0.01, 10.0), ("radius_um", 0.01, 5e3), ("diameter_um", 0.05, 5e3), ("length_um", 0.05, 5e3), ("width_um", 0.01, 5e3),
     ("segment_length_um", 0.05, 50.0), ("yeast_diameter_um", 0.05, 20.0), ("cytoplasm_diameter_um", 0.0, 100.0), ("colony_radius_um", 0.0, 500.0),
     ("fibre_width_um", 0.01, 5.0), ("grain_um", 0.05, 5.0), ("overhang_um", 0.0, 20.0), ("wrinkle_um", 0.01, 5.0),
-    ("clouds_um", 0.05, 100.0), ("clouds_stretch", 1.0, 100.0), ("fray_um", 0.0, 5.0), ("rim_um", 0.0, 10.0), ("edge_um", 0.0, 3.0),
+    ("clouds_um", 0.05, 100.0), ("clouds_stretch", 1.0, 100.0), ("texture_size", 0.05, 100.0), ("fray_um", 0.0, 5.0), ("rim_um", 0.0, 10.0), ("edge_um", 0.0, 3.0),
     ("rods", 1.0, 100.0), ("segments", 1.0, 100.0), ("cocci", 1.0, 1e5), ("lobes", 0.0, 16.0), ("fibres", 1.0, 1e3),
     ("dilations", 0.0, 200.0), ("notches", 0.0, 100.0), ("protrusions", 0.0, 100.0), ("wrinkles", 0.0, 1e3),
     ("nucleoli", 0.0, 100.0), ("body.rim", 1e-3, 10.0), ("rim", 0.0, 100.0), ("body.width", 0.05, 10.0),

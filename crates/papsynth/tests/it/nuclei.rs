@@ -52,20 +52,27 @@ fn nuclei_replace_the_displaced_part_of_a_cell_of_their_class() {
 fn the_strength_of_texture_varies_only_with_thickness_without_variation() {
     let model = Model::builtin();
     let kinds = &model.cytoplasm_texture.as_ref().unwrap().kinds;
-    let spread = |variation: f64| {
+    let spreads = |variation: f64, deviation_of: fn([f64; 2]) -> f64| {
         let cells = cells_of(|recipe| recipe.stain.texture_variation = variation.into());
         let deviation = |cell: &CellBody| {
-            let kind = kinds.iter().find(|kind| kind.name == cell.textures[0]).unwrap();
             let thickness = cell.cytoplasm_absorbance / model.classes[&cell.class].cytoplasm.absorbance.median;
-            libm::log(cell.detail.texture * thickness.sqrt() / kind.strength.median)
+            deviation_of([0, 1].map(|part| {
+                let kind = kinds.iter().find(|kind| kind.name == cell.textures[part]).unwrap();
+                libm::log(cell.detail.texture[part] * thickness.sqrt() / kind.strength.median)
+            }))
         };
         let of_cells: Vec<f64> = cells.iter().filter(|cell| cell.class == "intermediate").map(deviation).collect();
         assert!(of_cells.len() > 100, "{}", of_cells.len());
         let mean = of_cells.iter().sum::<f64>() / of_cells.len() as f64;
         (of_cells.iter().map(|d| (d - mean) * (d - mean)).sum::<f64>() / of_cells.len() as f64).sqrt()
     };
-    assert!(spread(0.0) < 1e-9);
-    // The deviations of the model: about 0.25 between cells, and as much between fields.
-    let [half, whole] = [0.5, 1.0].map(spread);
-    assert!((whole / half - 2.0).abs() < 1e-6 && (0.2..0.5).contains(&whole), "{half} {whole}");
+    for part in [|[outer, _]: [f64; 2]| outer, |[_, inner]: [f64; 2]| inner] {
+        assert!(spreads(0.0, part) < 1e-9);
+        // The deviations of the model: about 0.25 between cells, and as much between fields.
+        let [half, whole] = [0.5, 1.0].map(|variation| spreads(variation, part));
+        assert!((whole / half - 2.0).abs() < 1e-6 && (0.2..0.5).contains(&whole), "{half} {whole}");
+    }
+    // Both parts of a cell have a deviation of their own: in the difference, that of the field cancels.
+    let difference = spreads(1.0, |[outer, inner]| outer - inner);
+    assert!((0.25..0.5).contains(&difference), "{difference}");
 }

@@ -54,14 +54,14 @@ const RIM: [f64; 2] = [0.1, 0.6];
 const IRREGULAR: [f64; 2] = [0.05, 0.16];
 
 /// Contrast of the chromatin of an intact nucleus: minimum, maximum.
-const CHROMATIN: [f64; 2] = [0.06, 0.22];
+const CHROMATIN: [f64; 2] = [0.02, 0.2];
 /// Contrast of the chromatin of a smudged nucleus.
 const SMUDGED: f64 = 0.2;
 /// Contrast of the chromatin of a pyknotic nucleus.
 const PYKNOTIC: f64 = 0.03;
 /// Strength of the vacuoles of a cytoplasm: minimum, maximum. The relative standard deviation of the absorbance is 0.6
 /// times this number.
-const VACUOLES: [f64; 2] = [0.1, 0.5];
+const VACUOLES: [f64; 2] = [0.0, 0.5];
 /// Strength of the vacuoles of a histiocyte.
 const FOAM: f64 = 0.8;
 
@@ -89,7 +89,7 @@ const FLATNESS: [f64; 2] = [0.0, 0.9];
 /// Softness, µm: standard deviation of the blur of a leukocyte, minimum and maximum. Many leukocytes are about as high
 /// as wide, so that most of such a leukocyte is out of focus in every plane, and also in fused images. The range was
 /// chosen by eye beside fused and unfused images.
-const SOFTNESS_UM: [f64; 2] = [0.08, 0.42];
+const SOFTNESS_UM: [f64; 2] = [0.05, 0.4];
 /// Reach of this blur, in standard deviations.
 const SOFT_REACH: f64 = 3.0;
 

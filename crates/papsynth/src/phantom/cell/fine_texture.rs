@@ -16,7 +16,7 @@ pub(super) struct FineTexture<'a> {
     inner: Option<CoarseTile>,
     /// Fraction of the inner kind in a row, and its values.
     rows: [Vec<f32>; 2],
-    strength: f32,
+    strengths: [f32; 2],
 }
 
 impl<'a> FineTexture<'a> {
@@ -24,14 +24,16 @@ impl<'a> FineTexture<'a> {
     pub(super) fn new(cell: &CellContext<'a>, inner: Option<CoarseTile>) -> Result<Option<Self>, ErrorKind> {
         let (pools, pixel_um, mut rng) = (&cell.assets.textures, cell.pixel_um(), cell.stream("texture.place"));
         // A pixel shows the mean of the texture.
-        let strength = cell.body.detail.texture * (pools.texel_um() / pixel_um).min(1.0);
-        if strength <= 0.0 {
+        let averaged = (pools.texel_um() / pixel_um).min(1.0);
+        let strengths = cell.body.detail.texture.map(|strength| (strength * averaged) as f32);
+        if strengths.iter().all(|strength| *strength <= 0.0) {
             return Ok(None);
         }
-        let mut kind = |name| pools.pool(name).map(|pool| (pool, pools.sampler(pixel_um, &mut rng)));
+        let relative_um = pixel_um / cell.body.detail.texture_size;
+        let mut kind = |name| pools.pool(name).map(|pool| (pool, pools.sampler(relative_um, &mut rng)));
         let [outer, inner_kind] = &cell.body.textures;
         let kinds = [kind(outer)?, kind(inner_kind)?];
-        Ok(Some(Self { kinds, inner, rows: Default::default(), strength: strength as f32 }))
+        Ok(Some(Self { kinds, inner, rows: Default::default(), strengths }))
     }
 
     /// Writes columns of row `y` of the tile.
@@ -48,17 +50,18 @@ impl<'a> FineTexture<'a> {
             (&fractions[columns.clone()], &values[columns.clone()])
         });
         match fractions {
-            Some((fractions, values)) => mix_textures(&mut row[columns], values, fractions, self.strength),
-            None => row[columns].iter_mut().for_each(|value| *value *= self.strength),
+            Some((fractions, values)) => mix_textures(&mut row[columns], values, fractions, self.strengths),
+            None => row[columns].iter_mut().for_each(|value| *value *= self.strengths[0]),
         }
     }
 }
 
-/// Mixes two textures so that the variance of independent ones stays the same, and multiplies by `strength`.
+/// Multiplies two textures by their strengths, and mixes them so that the variance of independent ones of one strength
+/// stays the same.
 #[multiversion(targets = "simd")]
-fn mix_textures(outer: &mut [f32], inner: &[f32], fractions: &[f32], strength: f32) {
+fn mix_textures(outer: &mut [f32], inner: &[f32], fractions: &[f32], [outside, inside]: [f32; 2]) {
     for ((outer, inner), part) in outer.iter_mut().zip(inner).zip(fractions) {
         let rest = 1.0 - part;
-        *outer = strength * (rest * *outer + part * inner) / (rest * rest + part * part).sqrt();
+        *outer = (rest * outside * *outer + part * inside * inner) / (rest * rest + part * part).sqrt();
     }
 }

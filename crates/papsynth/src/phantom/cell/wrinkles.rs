@@ -38,7 +38,7 @@ const FORKED: f64 = 0.35;
 
 /// Fraction of the other wrinkles that are pleats, if they are not bundles: two dark lines with a paler band between,
 /// instead of ridges. This and the next two numbers were set by eye, beside cells of real fields.
-const PLEATS: f64 = 0.5;
+const PLEATS: f64 = 0.3;
 /// Width of a pleat relative to that of a ridge: minimum, maximum.
 const PLEAT_WIDTH: [f64; 2] = [0.8, 2.5];
 /// Fraction of wrinkles that are a bundle of fine ridges side by side, instead of one ridge or pleat: of those that
@@ -275,9 +275,9 @@ fn radius_of(outline: &[Point]) -> f64 {
 
 /// Draws a path of slowly changing curvature.
 fn curved_path(start: Point, direction: f64, radius: f64, step: f64, rng: &mut Stream) -> Vec<Point> {
-    let steps = random::count(random::between(0.35, 1.5, rng) * radius / step).max(4);
-    let mean = random::normal(rng) * 0.5 / radius;
-    let mut curvature = Autoregression::new(1.2 / radius, rng);
+    let steps = random::count(random::between(0.4, 1.7, rng) * radius / step).max(4);
+    let mean = random::normal(rng) * 0.8 / radius;
+    let mut curvature = Autoregression::new(2.0 / radius, rng);
     let (mut at, mut heading) = (start, direction);
     (0..steps)
         .map(|_| {
