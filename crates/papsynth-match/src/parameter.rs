@@ -132,8 +132,6 @@ parameters! {
     Structure: Simulated, Field, Logarithmic 0.2..3.0 "", "cytoplasm.clouds, flecks, cytoskeleton: factor";
     /// Strength of the fine texture of the cytoplasm, relative to the initial recipe.
     FineTexture: Simulated, Field, Logarithmic 0.1..6.0 "", "cytoplasm.texture: factor";
-    /// Sizes of the fine texture of the cytoplasm.
-    TextureSize: Simulated, Field, Logarithmic 0.4..1.8 "", "cytoplasm.texture_size";
     /// Number of cells.
     Cells: Simulated, Field, Logarithmic 40.0..700.0 "/mm2", "cells.*.count: all classes";
     /// Fraction of superficial cells among superficial and intermediate cells.

@@ -312,8 +312,8 @@ section! {
         flecks_threshold: Number = Number::uniform(0.55, 0.85), 0..=0.999;
         /// Amplitude of the third level of detail, the cytoskeleton, relative to the absorbance of the cytoplasm.
         cytoskeleton: Number = Number::uniform(0.05, 0.18), 0..=2;
-        /// Factor on the strength of the fine texture of the cytoplasm in the model: grains, networks and fibres. Matched
-        /// to 24 real fields, it is 0.43 to 1.04, with a median of 0.61.
+        /// Factor on the strength of the fine texture of the cytoplasm in the model: grains, networks and fibres.
+        /// Matched to 24 real fields, it is 0.43 to 1.04, with a median of 0.61.
         texture: Number
             (given [f64; 2] as texture: "Standard deviation of the fine texture of the outer and of the inner cytoplasm, relative to their absorbance.")
             = 0.62, 0..=20;
