@@ -38,7 +38,11 @@ REACH = 12  # largest distance of a detection from a nucleus, pixels
 THRESHOLD = 0.7  # probability of detections, chosen on the half of the fields that a recipe is matched to
 MASK_THRESHOLD = 0.5  # probability of masks
 SMALLEST = 60  # area of a detection, pixels
-MIN_EMPTY = 50  # pixels of the empty slide, in an eighth of the resolution, for which its light is fitted
+EMPTY = 0.96  # least light of the empty slide, relative to its mean there: cytoplasm and specks are darker
+FITS = 5  # of the light of the empty slide
+MIN_EMPTY = 10  # pixels of the empty slide in a ninth of the image, at an eighth of the resolution
+MIN_PARTS = 7  # ninths of the image that have so many, so that the light of the empty slide is fitted
+DIMMEST, BRIGHTEST = 0.8, 1.05  # limits of that light, relative to the bright parts of the image
 SCALES = (1.0, 1.2)  # of the image with a mask, whose pixel size is not known
 CHANNELS = 12  # of the first level of the network
 CONTRAST = 4.0  # factor on the images
@@ -63,21 +67,24 @@ def normalized(image):
 def empty_slide(grey):
     """Return the light of the empty slide at each pixel: a quadratic surface through the bright parts of the image.
 
-    Where light is uneven, the dim parts of the empty slide would otherwise look like pale cytoplasm.
+    Where light is uneven, the dim parts of the empty slide would otherwise look like pale cytoplasm. If the empty slide
+    is visible in small parts of the image only, one number is used for all pixels.
     """
     small = ndimage.zoom(grey, 0.125, order=1)
-    brightest = np.quantile(small, 0.97)
+    brightest = max(np.quantile(small, 0.97), 1)
     y, x = np.meshgrid(*(np.linspace(-1, 1, size) for size in small.shape), indexing="ij")
     terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1)
-    surface = np.full_like(small, brightest)
-    bright = small > 0.9 * brightest
-    for _ in range(10):
-        if bright.sum() < MIN_EMPTY:
-            break
-        surface = terms @ np.linalg.lstsq(terms[bright], small[bright], rcond=None)[0]
-        bright = (np.abs(small / surface - 1.01) < 0.04) & (small > 0.85 * brightest)
+    empty = small > EMPTY * brightest
+    for _ in range(FITS):
+        # Pixels of the empty slide in each ninth of the image.
+        parts = [part for rows in np.array_split(empty, 3) for part in np.array_split(rows, 3, axis=1)]
+        if sum(part.sum() >= MIN_EMPTY for part in parts) < MIN_PARTS:
+            return np.full(grey.shape, brightest, np.float32)
+        surface = terms @ np.linalg.lstsq(terms[empty], small[empty], rcond=None)[0]
+        empty = small > EMPTY * np.clip(surface, DIMMEST * brightest, None)
     size = [full / part for full, part in zip(grey.shape, small.shape)]
-    return ndimage.zoom(np.clip(surface, 0.85 * brightest, 1.05 * brightest), size, order=1)
+    surface = np.clip(surface, DIMMEST * brightest, BRIGHTEST * brightest)
+    return ndimage.zoom(surface, size, order=1).astype(np.float32)
 
 
 def centres(file):

@@ -44,7 +44,7 @@ const LEUKOCYTES: [(&str, &[&str]); 2] = [
 /// Factor of `papsynth generate --widen`.
 const WIDEN: &str = "1.5";
 
-/// Version of `nucleus_net.py`: results of another version are kept apart.
+/// Version of `nucleus_net.py` and of its sets: results of another version are kept apart.
 const METHOD: u32 = 6;
 
 /// Version of `overlap_net.py` and of its sets: results of another version are kept apart.
@@ -195,7 +195,7 @@ fn overlap(workspace: &Workspace, options: &Worth) -> Result<()> {
 
 /// Returns a folder with two data sets of synthetic fields for each grade, matched to a half of the real ones.
 fn synthetic(workspace: &Workspace, folder: &Path, real: &Path, half: usize, widen: &str) -> Result<PathBuf> {
-    let out = folder.join(format!("synthetic-{half}-{widen}"));
+    let out = folder.join(format!("synthetic-{METHOD}-{half}-{widen}"));
     if out.exists() {
         return Ok(out);
     }

@@ -518,7 +518,7 @@ class Cytoplasm(Section):
 
     texture: Number | None = None
     """Factor on the strength of the fine texture of the cytoplasm in the model: grains, networks and fibres. Matched to
-    24 real fields, it is 0.43 to 1.04, with a median of 0.61. From 0 to 20.
+    the 24 fields of Cervix93, it is 0.43 to 1.04, with a median of 0.61. From 0 to 20.
     """
 
     texture_size: Number | None = None
@@ -1463,7 +1463,7 @@ class Stain(Section):
     texture_variation: Number | None = None
     """Factor by which the standard deviations of the strength of the fine texture of cytoplasm, between cells and
     between fields, are multiplied. Drawn once per field. The outer and the inner cytoplasm of a cell have a strength
-    each. From 0 to 5.
+    each. Between fields, half of the deviation of the model counts. From 0 to 5.
     """
 
     slide_balance: Number | None = None

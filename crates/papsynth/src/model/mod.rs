@@ -38,7 +38,8 @@ pub struct Model {
 pub struct CytoplasmTexture {
     /// Pixel size of the statistics, µm.
     pub pixel_um: f64,
-    /// Standard deviation between fields of the logarithm of the strength.
+    /// Standard deviation between fields of the logarithm of the strength, on small areas. A scene uses half of it
+    /// times `stain.texture_variation`.
     pub field_log_sd: f64,
     /// Probability that a cell has the kind that its field has drawn, instead of a kind of its own.
     #[serde(default)]

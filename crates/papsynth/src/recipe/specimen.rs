@@ -313,7 +313,7 @@ section! {
         /// Amplitude of the third level of detail, the cytoskeleton, relative to the absorbance of the cytoplasm.
         cytoskeleton: Number = Number::uniform(0.05, 0.18), 0..=2;
         /// Factor on the strength of the fine texture of the cytoplasm in the model: grains, networks and fibres.
-        /// Matched to 24 real fields, it is 0.43 to 1.04, with a median of 0.61.
+        /// Matched to the 24 fields of Cervix93, it is 0.43 to 1.04, with a median of 0.61.
         texture: Number
             (given [f64; 2] as texture: "Standard deviation of the fine texture of the outer and of the inner cytoplasm, relative to their absorbance.")
             = 0.62, 0..=20;
@@ -453,7 +453,7 @@ section! {
         nucleus_variation: Number = 1.0, 0..=5;
         /// Factor by which the standard deviations of the strength of the fine texture of cytoplasm, between cells and
         /// between fields, are multiplied. Drawn once per field. The outer and the inner cytoplasm of a cell have a
-        /// strength each.
+        /// strength each. Between fields, half of the deviation of the model counts.
         texture_variation: Number = 1.5, 0..=5;
         /// Variation of the dye balance between slides: standard deviation of the logarithm of each dye's amount.
         slide_balance: Number = 0.15, 0..=2;

@@ -306,8 +306,8 @@ fn drawn_kind<'a>(texture: &'a CytoplasmTexture, of_field: f64, rng: &mut Stream
 const TEXTURE_ABSORBANCE: f64 = 0.125;
 
 /// Variation of the strength of the texture between fields, relative to that in the model, which is measured on small
-/// areas and includes what differs within fields. Matched to 24 real fields, the strength has a logarithmic standard
-/// deviation of 0.2 between fields.
+/// areas and includes what differs within fields. Matched to the 24 fields of Cervix93, the strength has a logarithmic
+/// standard deviation of 0.2 between fields.
 const BETWEEN_FIELDS: f64 = 0.5;
 
 /// Fraction of the variation of the standard deviation of chromatin that is independent of the absorbance.
