@@ -31,6 +31,8 @@ import tensorflow as tf
 from PIL import Image
 from scipy import ndimage
 from scipy.optimize import linear_sum_assignment
+from skimage.morphology import h_maxima
+from skimage.segmentation import watershed
 
 SIDE, BATCH = 192, 8  # of the crops of a batch
 DISC = 10  # radius of the discs at annotated centres, pixels
@@ -38,6 +40,7 @@ REACH = 12  # largest distance of a detection from a nucleus, pixels
 THRESHOLD = 0.7  # probability of detections, chosen on the half of the fields that a recipe is matched to
 MASK_THRESHOLD = 0.5  # probability of masks
 SMALLEST = 60  # area of a detection, pixels
+NECK = 0.5  # least depth of a neck at which a region is split, pixels; chosen on the same half
 EMPTY = 0.96  # least light of the empty slide, relative to its mean there: cytoplasm and specks are darker
 FITS = 5  # of the light of the empty slide
 MIN_EMPTY = 10  # pixels of the empty slide in a ninth of the image, at an eighth of the resolution
@@ -260,13 +263,18 @@ def away_from_border(mask):
 
 
 def detections(found):
-    """Return the centres of the regions above the threshold, and which of them are at the border of the image."""
-    regions, count = ndimage.label(ndimage.binary_opening(found > THRESHOLD, iterations=2))
-    index = np.arange(1, count + 1)
+    """Return the centres of the nuclei above the threshold, and which of them are at the border of the image.
+
+    Regions are split at their necks: overlapping nuclei have one region.
+    """
+    mask = ndimage.binary_opening(found > THRESHOLD, iterations=2)
+    depth = ndimage.gaussian_filter(ndimage.distance_transform_edt(mask), 1)
+    peaks, count = ndimage.label(h_maxima(depth, NECK) & mask, np.ones((3, 3)))
     if count == 0:
         return np.zeros((0, 2)), np.zeros(0, bool)
-    large = ndimage.sum_labels(np.ones(regions.shape), regions, index) >= SMALLEST
-    places = np.array(ndimage.center_of_mass(regions > 0, regions, index))
+    regions, index = watershed(-depth, peaks, mask=mask), np.arange(1, count + 1)
+    large = ndimage.sum_labels(mask, regions, index) >= SMALLEST
+    places = np.array(ndimage.center_of_mass(mask, regions, index))
     return places[large], np.isin(index, at_border(regions))[large]
 
 

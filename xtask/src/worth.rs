@@ -11,7 +11,7 @@ use crate::workspace::Workspace;
 use crate::{dataset, python};
 
 /// Packages of the network.
-const PACKAGES: &str = "numpy\npillow\nscipy\n\
+const PACKAGES: &str = "numpy\npillow\nscikit-image\nscipy\n\
     tensorflow-cpu; sys_platform == 'linux' and platform_machine == 'x86_64'\n\
     tensorflow; sys_platform != 'linux' or platform_machine != 'x86_64'\n";
 
@@ -45,7 +45,7 @@ const LEUKOCYTES: [(&str, &[&str]); 2] = [
 const WIDEN: &str = "1.5";
 
 /// Version of `nucleus_net.py` and of its sets: results of another version are kept apart.
-const METHOD: u32 = 6;
+const METHOD: u32 = 7;
 
 /// Version of `overlap_net.py` and of its sets: results of another version are kept apart.
 const OVERLAP_METHOD: u32 = 3;

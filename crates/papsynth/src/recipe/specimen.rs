@@ -292,7 +292,7 @@ section! {
         wrinkles: Number (given usize) = Number::log_normal(15.0, 0.6).at_most(60.0), 0..=100;
         /// Additional thickness at the crest of a wrinkle, relative to the flat sheet. Rolled stretches of the rim have
         /// 0.4 to 1.6 times this thickness.
-        wrinkle_thickness: Number (given f64) = Number::log_normal(0.42, 0.6).at_most(1.3), 0..=5;
+        wrinkle_thickness: Number (given f64) = Number::log_normal(0.34, 0.6).at_most(1.3), 0..=5;
         /// Width of a wrinkle: standard deviation of its profile. Rolled stretches of the rim have 0.4 to 0.9 µm.
         wrinkle_um: Number (given f64) = Number::uniform(0.25, 1.0), 0.05..=5, "µm";
         /// Additional density and granularity of the cytoplasm around the nucleus, relative to the rest.
