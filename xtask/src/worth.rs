@@ -203,7 +203,7 @@ fn synthetic(workspace: &Workspace, folder: &Path, real: &Path, half: usize, wid
     shell::remove(&partial)?;
     shell::make(&partial)?;
     for (number, (grade, _, preset)) in GRADES.into_iter().enumerate() {
-        let recipe = folder.join(format!("matched-{grade}-{half}.toml"));
+        let recipe = folder.join(format!("matched-{METHOD}-{grade}-{half}.toml"));
         if !recipe.exists() {
             let mut fit = program(workspace);
             fit.args(["match", "--pixel-um", PIXEL_UM, "--group", grade, "--preset", preset, "--out"]);
