@@ -486,7 +486,7 @@ class Cytoplasm(Section):
     """
 
     endoplasm: Number | None = None
-    """Additional density and granularity of the cytoplasm around the nucleus, relative to the rest. From 0 to 2."""
+    """Additional thickness of the inner cytoplasm, relative to the rest: 1.4 times this number. From 0 to 2."""
 
     clouds: Number | None = None
     """Amplitude of the first level of detail, low-frequency noise, relative to the absorbance of the cytoplasm. Dark

@@ -176,7 +176,7 @@ pub(super) fn fray_um(detail: &CellDetail) -> f64 {
 
 /// Standard deviations of the smoothing of the noise fields of degenerated material, µm: two sizes of grains, clumps of
 /// grains, and patches.
-const MATERIAL_UM: [f64; 4] = [0.2, 0.5, 1.1, 3.0];
+const MATERIAL_UM: [f64; 4] = [0.16, 0.35, 0.8, 3.0];
 
 /// Width of the zone at the rim with most of the material, µm.
 const MARGIN_UM: f64 = 6.0;
@@ -187,9 +187,11 @@ const INSIDE: [f32; 2] = [-0.4, 0.9];
 const AT_RIM: f32 = 0.6;
 const OF_PATCHES: f32 = 0.4;
 
-/// Absorbance of the material relative to its strength: mean, and standard deviation of the grains of each size.
+/// Absorbance of the material relative to its strength, negative values apart: mean, and standard deviation of the
+/// grains of each size and of the clumps.
 const MATERIAL: f32 = 0.8;
-const GRAINS: f32 = 0.28;
+const GRAINS: f32 = 0.42;
+const CLUMPS: f32 = 0.14;
 
 /// Material crumbles at the rim: the fraction that is left is the first number at the rim, rises by the second one over
 /// the width of the zone, and varies between clumps. Set by eye, beside degenerated cells of real fields.
@@ -231,7 +233,7 @@ fn encrust(row: &mut [f32], fields: [&[f32]; 4], sums: &[f32], weight: f32, stre
         let margin = 1.0 - (2.0 * weight * sum - 1.0).clamp(0.0, 1.0);
         let covered = (inside + AT_RIM * margin + OF_PATCHES * patches).clamp(0.0, 1.0);
         let whole = (WHOLE + (1.0 - margin) * CRUMBLING + clumps).clamp(0.0, 1.0);
-        let grain = whole * (MATERIAL + GRAINS * (fine + coarse + clumps));
+        let grain = whole * (MATERIAL + GRAINS * (fine + coarse) + CLUMPS * clumps);
         *value += strength * covered * if grain > 0.0 { grain } else { 0.0 };
     }
 }
@@ -294,8 +296,9 @@ fn thin(values: &mut [f32], sums: &[f32], weight: f32) {
 /// Radius of the region where the nucleus lifts the sheet, relative to the nucleus radius.
 const LIFTED: f64 = 2.4;
 
-/// Increase of thickness there, relative to the density of the endoplasm: matched by eye to real cells.
-const LIFT: f32 = 1.6;
+/// Increase of thickness at the nucleus, relative to the density of the endoplasm. Single normal cells of Cervix93
+/// hardly become thicker towards the nucleus within the endoplasm.
+const LIFT: f32 = 0.5;
 
 /// Steps of a radial ramp.
 const STEPS: usize = 6;
@@ -424,7 +427,9 @@ pub(super) fn add_endoplasm(
     Some(ramp_of_zone)
 }
 
-/// Increase of thickness in the endoplasm relative to its density.
+/// Increase of thickness in the endoplasm relative to its density. With the default recipe, the absorbance of a cell
+/// relative to its median, which includes the endoplasm, rises from 0.95 at a fifth of the way from the rim to the
+/// centre to 1.2 or 1.3 in the inner half, as in 26 single normal cells of Cervix93.
 const INNER: f32 = 1.4;
 
 /// Thickens a row by the density of the endoplasm where it is inside.
