@@ -120,7 +120,7 @@ pub struct CytoplasmStatistics {
     /// Radius of the circle of the first Fourier descriptor, |u₁|, µm: a median of 0.5 to 100 µm, and a standard
     /// deviation of the logarithm of 0 to 1. Drawn radii are at most 300 µm.
     pub radius_um: LogNormal,
-    /// Median absorbance of a cell.
+    /// Median absorbance of a cell without its endoplasm.
     pub absorbance: LogNormal,
     /// Thickness from rim to centre in equal steps, relative to its median.
     pub rim_to_centre: Vec<f64>,
