@@ -294,7 +294,7 @@ section! {
         /// 0.4 to 1.6 times this thickness.
         wrinkle_thickness: Number (given f64) = Number::log_normal(0.34, 0.6).at_most(1.3), 0..=5;
         /// Width of a wrinkle: standard deviation of its profile. Rolled stretches of the rim have 0.4 to 0.9 µm.
-        wrinkle_um: Number (given f64) = Number::uniform(0.25, 1.0), 0.05..=5, "µm";
+        wrinkle_um: Number (given f64) = Number::uniform(0.3, 1.3), 0.05..=5, "µm";
         /// Additional thickness of the inner cytoplasm, relative to the rest: 1.4 times this number.
         endoplasm: Number (given f64) = Number::log_normal(0.4, 0.5).at_most(1.5), 0..=2;
         /// Amplitude of the first level of detail, low-frequency noise, relative to the absorbance of the cytoplasm.

@@ -29,6 +29,7 @@ pub(super) fn add_detail(
     let flecks = FieldSampler::fine(pixel_um, rng);
     let mut texture = FineTexture::new(cell, inner)?;
     let (cloud, fleck) = (detail.clouds as f32, detail.flecks as f32);
+    let patches = if clouds.is_some() { TEXTURE_PATCHES } else { 0.0 };
     let threshold = if fleck > 0.0 { noise_fields.flecks().quantile(detail.flecks_threshold) } else { 0.0 };
     let width = absorbance.width;
     let mut fields = [(); 3].map(|()| vec![0.0_f32; width]);
@@ -48,7 +49,7 @@ pub(super) fn add_detail(
             texture.row_into(of_texture, first..end, y);
         }
         let fields = [&*of_clouds, of_flecks, of_texture].map(|field| &field[first..end]);
-        modulate(&mut row[first..end], fields, [cloud, fleck], threshold);
+        modulate(&mut row[first..end], fields, [cloud, fleck, patches], threshold);
     }
     Ok(())
 }
@@ -59,6 +60,10 @@ const SMOOTH_PX: f64 = 3.0 * COARSE as f64;
 
 /// Thickness for which the strength of the texture was measured, relative to the flat sheet.
 const TEXTURE_THICKNESS: f32 = 1.3;
+
+/// Standard deviation of the strength of the texture over a cell with clouds, relative to its root mean square: it is
+/// stronger where clouds are dark. Set by eye: real cells are granular in patches.
+const TEXTURE_PATCHES: f32 = 0.3;
 
 /// Sizes of the two noise fields of clouds, relative to `clouds_um`. Set by eye.
 const CLOUDS_SIZES: [f64; 2] = [1.2, 0.6];
@@ -126,11 +131,16 @@ const SKEWNESS: f32 = 0.25;
 /// The texture adds up at random over the thickness, so that its relative deviation is inversely proportional to the
 /// root of the thickness: it is strong at thin rims and weak on folds.
 #[multiversion(targets = "simd")]
-fn modulate(row: &mut [f32], [clouds, flecks, texture]: [&[f32]; 3], strengths: [f32; 2], threshold: f32) {
+fn modulate(row: &mut [f32], [clouds, flecks, texture]: [&[f32]; 3], strengths: [f32; 3], threshold: f32) {
+    // The strength of the texture at a place: a + b·cloud, where a² + b² = 1.
+    let even = 1.0 / (1.0 + strengths[2] * strengths[2]).sqrt();
+    let patches = even * strengths[2];
     for (((value, cloud), &fleck), texture) in row.iter_mut().zip(clouds).zip(flecks).zip(texture) {
         let above = if fleck > threshold { fleck - threshold } else { 0.0 };
         let thickness = if *value > 0.0 { *value } else { 0.0 };
-        let deviation = texture * (TEXTURE_THICKNESS * thickness).sqrt();
+        let strength = even + patches * cloud;
+        let strength = if strength > 0.0 { strength } else { 0.0 };
+        let deviation = texture * strength * (TEXTURE_THICKNESS * thickness).sqrt();
         let cloud = cloud + SKEWNESS * (cloud * cloud - 1.0);
         let changed = thickness * (1.0 + strengths[0] * cloud + strengths[1] * above) + deviation;
         *value = if changed > 0.0 { changed } else { 0.0 };
@@ -193,6 +203,9 @@ const MATERIAL: f32 = 0.8;
 const GRAINS: f32 = 0.42;
 const CLUMPS: f32 = 0.14;
 
+/// Increase of the standard deviation of the grains in patches of more material. Set by eye.
+const UNEVEN: f32 = 0.5;
+
 /// Material crumbles at the rim: the fraction that is left is the first number at the rim, rises by the second one over
 /// the width of the zone, and varies between clumps. Set by eye, beside degenerated cells of real fields.
 const WHOLE: f32 = -0.5;
@@ -233,7 +246,8 @@ fn encrust(row: &mut [f32], fields: [&[f32]; 4], sums: &[f32], weight: f32, stre
         let margin = 1.0 - (2.0 * weight * sum - 1.0).clamp(0.0, 1.0);
         let covered = (inside + AT_RIM * margin + OF_PATCHES * patches).clamp(0.0, 1.0);
         let whole = (WHOLE + (1.0 - margin) * CRUMBLING + clumps).clamp(0.0, 1.0);
-        let grain = whole * (MATERIAL + GRAINS * (fine + coarse) + CLUMPS * clumps);
+        let uneven = (1.0 + UNEVEN * patches).max(0.0);
+        let grain = whole * (MATERIAL + GRAINS * uneven * (fine + coarse) + CLUMPS * clumps);
         *value += strength * covered * if grain > 0.0 { grain } else { 0.0 };
     }
 }
@@ -298,7 +312,7 @@ const LIFTED: f64 = 2.4;
 
 /// Increase of thickness at the nucleus, relative to the density of the endoplasm. Single normal cells of Cervix93
 /// hardly become thicker towards the nucleus within the endoplasm.
-const LIFT: f32 = 0.5;
+const LIFT: f32 = 0.3;
 
 /// Steps of a radial ramp.
 const STEPS: usize = 6;
@@ -477,6 +491,28 @@ mod tests {
             assert!((found - thinning(distance)).abs() < 1e-3, "{x}: {found} {}", thinning(distance));
         }
         assert!(thinning(0.0) == 0.0 && thinning(1.0) == 1.0 && thinning(3.0) == 1.0);
+    }
+
+    #[test]
+    fn texture_is_stronger_in_dark_clouds_and_keeps_its_variance() {
+        let mut rng = Key { seed: 2, index: 0 }.stream("test", 0, "texture");
+        let [clouds, texture] =
+            [(); 2].map(|()| (0..40_000).map(|_| random::normal(&mut rng) as f32).collect::<Vec<_>>());
+        let none = vec![0.0; clouds.len()];
+        let variances = [0.0, TEXTURE_PATCHES].map(|patches| {
+            let mut row = vec![1.0; clouds.len()];
+            let texture: Vec<f32> = texture.iter().map(|value| 0.1 * value).collect();
+            modulate(&mut row, [&clouds, &none, &texture], [0.0, 0.0, patches], 0.0);
+            let of = |part: &dyn Fn(f32) -> bool| {
+                let squares = row.iter().zip(&clouds).filter(|(_, cloud)| part(**cloud));
+                let (sum, count) = squares.fold((0.0, 0), |(sum, n), (v, _)| (sum + f64::from(v - 1.0).powi(2), n + 1));
+                sum / f64::from(count)
+            };
+            [of(&|_| true), of(&|cloud| cloud < 0.0), of(&|cloud| cloud > 0.0)]
+        });
+        let [[even, pale, dark], [all, in_pale, in_dark]] = variances;
+        assert!((pale / dark - 1.0).abs() < 0.05 && (all / even - 1.0).abs() < 0.05, "{variances:?}");
+        assert!(in_dark > 2.0 * in_pale, "{variances:?}");
     }
 
     #[test]
