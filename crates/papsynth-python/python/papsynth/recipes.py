@@ -477,7 +477,7 @@ class Cytoplasm(Section):
 
     wrinkle_thickness: Number | None = None
     """Additional thickness at the crest of a wrinkle, relative to the flat sheet. Rolled stretches of the rim have 0.4
-    to 1.6 times this thickness. From 0 to 5.
+    to 1.6 times this thickness. Ridges narrower than 0.6 µm are thinner in proportion to their width. From 0 to 5.
     """
 
     wrinkle_um: Number | None = None
@@ -490,7 +490,8 @@ class Cytoplasm(Section):
 
     clouds: Number | None = None
     """Amplitude of the first level of detail, low-frequency noise, relative to the absorbance of the cytoplasm. Dark
-    places are smaller and stronger than pale ones. From 0 to 2.
+    places are smaller and stronger than pale ones. In cells with clouds of any amplitude, the fine texture is stronger
+    in dark places. From 0 to 2.
     """
 
     clouds_um: Number | None = None

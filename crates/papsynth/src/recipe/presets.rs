@@ -78,7 +78,7 @@ impl Preset {
 
 impl Recipe {
     /// Returns the same slide as an EDF image of a scanner: with the focus, blur, softness of edges, noise, texture and
-    /// staining strength of [`Preset::ExtendedFocus`], its nuclei of even thickness, and no objects out of focus.
+    /// staining strength of [`Preset::ExtendedFocus`], and no objects out of focus.
     #[must_use]
     pub fn fused(mut self) -> Self {
         let like = Preset::ExtendedFocus.recipe();
@@ -91,7 +91,7 @@ impl Recipe {
                 $(self.$section.$number = like.$section.$number;)*
             };
         }
-        take!(nucleus.edge_um, nucleus.clumping, nucleus.thickness_gradient, cytoplasm.rim_um);
+        take!(nucleus.edge_um, nucleus.clumping, cytoplasm.rim_um);
         take!(camera.prnu, camera.full_well_e, camera.glare_subtracted, camera.read_noise_e, camera.sensor_dust);
         take!(stain.slide_cytoplasm, stain.slide_nucleus, stain.field_texture);
         self.debris.out_of_focus.count = like.debris.out_of_focus.count;
@@ -127,7 +127,10 @@ mod tests {
         let fused = own.clone().fused();
         assert!(fused.problems().is_empty(), "{:?}", fused.problems());
         assert_eq!((fused.focus.output, &fused.focus.planes), (like.focus.output, &like.focus.planes));
-        assert_eq!(fused.nucleus.thickness_gradient, like.nucleus.thickness_gradient);
+        assert_eq!(
+            (&fused.nucleus.edge_um, &fused.stain.field_texture),
+            (&like.nucleus.edge_um, &like.stain.field_texture)
+        );
         assert_eq!(fused.debris.out_of_focus.count, like.debris.out_of_focus.count);
         assert_eq!((&fused.cells, &fused.debris.leukocytes), (&own.cells, &own.debris.leukocytes));
     }

@@ -291,14 +291,15 @@ section! {
         /// rim. Two fifths are bundles, whose ridges have a width of 0.25 to 0.5 µm.
         wrinkles: Number (given usize) = Number::log_normal(15.0, 0.6).at_most(60.0), 0..=100;
         /// Additional thickness at the crest of a wrinkle, relative to the flat sheet. Rolled stretches of the rim have
-        /// 0.4 to 1.6 times this thickness.
+        /// 0.4 to 1.6 times this thickness. Ridges narrower than 0.6 µm are thinner in proportion to their width.
         wrinkle_thickness: Number (given f64) = Number::log_normal(0.34, 0.6).at_most(1.3), 0..=5;
         /// Width of a wrinkle: standard deviation of its profile. Rolled stretches of the rim have 0.4 to 0.9 µm.
         wrinkle_um: Number (given f64) = Number::uniform(0.3, 1.3), 0.05..=5, "µm";
         /// Additional thickness of the inner cytoplasm, relative to the rest: 1.4 times this number.
         endoplasm: Number (given f64) = Number::log_normal(0.4, 0.5).at_most(1.5), 0..=2;
         /// Amplitude of the first level of detail, low-frequency noise, relative to the absorbance of the cytoplasm.
-        /// Dark places are smaller and stronger than pale ones.
+        /// Dark places are smaller and stronger than pale ones. In cells with clouds of any amplitude, the fine texture
+        /// is stronger in dark places.
         clouds: Number = Number::uniform(0.045, 0.17), 0..=2;
         /// Standard deviation of the smoothing of that noise: two noise fields with 1.2 and 0.7 times this number, each
         /// stretched in a direction of its own.

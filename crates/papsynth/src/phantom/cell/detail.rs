@@ -49,7 +49,7 @@ pub(super) fn add_detail(
             texture.row_into(of_texture, first..end, y);
         }
         let fields = [&*of_clouds, of_flecks, of_texture].map(|field| &field[first..end]);
-        modulate(&mut row[first..end], fields, [cloud, fleck, patches], threshold);
+        modulate(&mut row[first..end], fields, [cloud, fleck], patches, threshold);
     }
     Ok(())
 }
@@ -61,8 +61,8 @@ const SMOOTH_PX: f64 = 3.0 * COARSE as f64;
 /// Thickness for which the strength of the texture was measured, relative to the flat sheet.
 const TEXTURE_THICKNESS: f32 = 1.3;
 
-/// Standard deviation of the strength of the texture over a cell with clouds, relative to its root mean square: it is
-/// stronger where clouds are dark. Set by eye: real cells are granular in patches.
+/// Standard deviation of the strength of the texture relative to its mean, in cells with clouds: it is stronger where
+/// clouds are dark. Set by eye: real cells are granular in patches.
 const TEXTURE_PATCHES: f32 = 0.3;
 
 /// Sizes of the two noise fields of clouds, relative to `clouds_um`. Set by eye.
@@ -129,16 +129,23 @@ const SKEWNESS: f32 = 0.25;
 /// Clouds are skewed by their square, which increases their standard deviation by 6 %. Negative factors count as 0.
 ///
 /// The texture adds up at random over the thickness, so that its relative deviation is inversely proportional to the
-/// root of the thickness: it is strong at thin rims and weak on folds.
+/// root of the thickness: it is strong at thin rims and weak on folds. Its strength increases with the clouds;
+/// `patches` is the standard deviation of the strength relative to its mean.
 #[multiversion(targets = "simd")]
-fn modulate(row: &mut [f32], [clouds, flecks, texture]: [&[f32]; 3], strengths: [f32; 3], threshold: f32) {
+fn modulate(
+    row: &mut [f32],
+    [clouds, flecks, texture]: [&[f32]; 3],
+    strengths: [f32; 2],
+    patches: f32,
+    threshold: f32,
+) {
     // The strength of the texture at a place: a + b·cloud, where a² + b² = 1.
-    let even = 1.0 / (1.0 + strengths[2] * strengths[2]).sqrt();
-    let patches = even * strengths[2];
+    let mean = 1.0 / (1.0 + patches * patches).sqrt();
+    let slope = mean * patches;
     for (((value, cloud), &fleck), texture) in row.iter_mut().zip(clouds).zip(flecks).zip(texture) {
         let above = if fleck > threshold { fleck - threshold } else { 0.0 };
         let thickness = if *value > 0.0 { *value } else { 0.0 };
-        let strength = even + patches * cloud;
+        let strength = mean + slope * cloud;
         let strength = if strength > 0.0 { strength } else { 0.0 };
         let deviation = texture * strength * (TEXTURE_THICKNESS * thickness).sqrt();
         let cloud = cloud + SKEWNESS * (cloud * cloud - 1.0);
@@ -198,12 +205,13 @@ const AT_RIM: f32 = 0.6;
 const OF_PATCHES: f32 = 0.4;
 
 /// Absorbance of the material relative to its strength, negative values apart: mean, and standard deviation of the
-/// grains of each size and of the clumps.
+/// grains of each size, where patches have their mean, and of the clumps.
 const MATERIAL: f32 = 0.8;
 const GRAINS: f32 = 0.42;
 const CLUMPS: f32 = 0.14;
 
-/// Increase of the standard deviation of the grains in patches of more material. Set by eye.
+/// Change of the standard deviation of the grains, relative to it, per standard deviation of the patches: it is larger
+/// where there is more material. Set by eye.
 const UNEVEN: f32 = 0.5;
 
 /// Material crumbles at the rim: the fraction that is left is the first number at the rim, rises by the second one over
@@ -502,10 +510,11 @@ mod tests {
         let variances = [0.0, TEXTURE_PATCHES].map(|patches| {
             let mut row = vec![1.0; clouds.len()];
             let texture: Vec<f32> = texture.iter().map(|value| 0.1 * value).collect();
-            modulate(&mut row, [&clouds, &none, &texture], [0.0, 0.0, patches], 0.0);
+            modulate(&mut row, [&clouds, &none, &texture], [0.0; 2], patches, 0.0);
             let of = |part: &dyn Fn(f32) -> bool| {
                 let squares = row.iter().zip(&clouds).filter(|(_, cloud)| part(**cloud));
-                let (sum, count) = squares.fold((0.0, 0), |(sum, n), (v, _)| (sum + f64::from(v - 1.0).powi(2), n + 1));
+                let differences = squares.map(|(value, _)| f64::from(value - 1.0));
+                let (sum, count) = differences.fold((0.0, 0), |(sum, count), d| (sum + d * d, count + 1));
                 sum / f64::from(count)
             };
             [of(&|_| true), of(&|cloud| cloud < 0.0), of(&|cloud| cloud > 0.0)]
@@ -513,6 +522,16 @@ mod tests {
         let [[even, pale, dark], [all, in_pale, in_dark]] = variances;
         assert!((pale / dark - 1.0).abs() < 0.05 && (all / even - 1.0).abs() < 0.05, "{variances:?}");
         assert!(in_dark > 2.0 * in_pale, "{variances:?}");
+    }
+
+    #[test]
+    fn grains_are_stronger_in_patches_of_more_material() {
+        let (half, none) = ([0.5_f32; 3], [0.0_f32; 3]);
+        let mut row = [0.0; 3];
+        // Twice the strength, so that all of the inside is covered.
+        encrust(&mut row, [&half, &half, &none, &[-1.0, 0.0, 1.0]], &[1.0; 3], 1.0, 2.0);
+        let expected = [-1.0, 0.0, 1.0].map(|patch| 2.0 * (MATERIAL + GRAINS * (1.0 + UNEVEN * patch)));
+        row.iter().zip(expected).for_each(|(found, expected)| assert!((found - expected).abs() < 1e-5, "{row:?}"));
     }
 
     #[test]

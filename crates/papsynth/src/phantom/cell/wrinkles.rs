@@ -30,13 +30,15 @@ const EDGE_UM: [f64; 2] = [0.35, 0.8];
 
 /// Fraction of the other wrinkles that follow the rim.
 const ALONG_RIM: f64 = 0.4;
-/// Width of the mean of a path along the rim, relative to its distance from it: farther inside, it follows less of the
-/// shape of the rim.
+
+/// Length over which a path along the rim is averaged, relative to its mean distance from the rim: paths farther inside
+/// follow less of the shape of the rim.
 const SMOOTHED: f64 = 3.0;
 
-/// Width from which a ridge is as thick as its wrinkles say; a narrower one is thinner in proportion. Set by eye: most
-/// dark folds of real cells are wide.
+/// Width from which a ridge has its full thickness; a narrower one is thinner in proportion. Ridges beside the first
+/// one of a bundle are reduced by the width of that one. Set by eye: most dark folds of real cells are wide.
 const WIDE_UM: f64 = 0.6;
+
 /// Thickness and width of another wrinkle relative to the mean: minimum, maximum.
 const THICKNESS: [f64; 2] = [0.4, 1.6];
 const WIDTH: [f64; 2] = [0.6, 1.6];
@@ -242,23 +244,28 @@ fn random_factors(count: usize, rng: &mut Stream) -> Vec<f64> {
     (0..count).map(|_| (0.9 + noise.next(rng)).clamp(0.0, 2.5)).collect()
 }
 
-/// Draws a path along the rim, moved inwards by `inset` radii of the cell, plus `drift` from end to end. `fine` is the
-/// outline at equal steps.
+/// Draws a path along the rim, averaged over a part of it, and moved inwards by `inset` radii of the cell, plus `drift`
+/// from end to end. `fine` is the outline at equal steps.
 fn along_rim(outline: &[Point], fine: &[Point], inset: f64, drift: f64, rng: &mut Stream) -> Vec<Point> {
     let middle = fsd_shape::centroid(outline);
     let length = random::count(fine.len() as f64 * random::between(0.06, 0.45, rng)).max(4);
     let first = random::below(fine.len(), rng);
     let mut noise = Autoregression::new(0.022, rng);
-    // The perimeter of a cell is at least 2π radii.
-    let reach = random::count(0.5 * SMOOTHED * inset * fine.len() as f64 / (2.0 * core::f64::consts::PI));
+    // A circle of n points has n/2π points per radius.
+    let reach = random::count(0.5 * SMOOTHED * inset * fine.len() as f64 / core::f64::consts::TAU);
     (0..length)
         .map(|i| {
-            let p = mean_near(fine, first + i, reach.min(fine.len() / 6));
+            let p = mean_near(fine, first + i, reach);
             let t = i as f64 / length as f64;
             let shrink = 1.0 - (inset + drift * (t - 0.5) + noise.next(rng)).max(0.008);
             [middle[0] + shrink * (p[0] - middle[0]), middle[1] + shrink * (p[1] - middle[1])]
         })
         .collect()
+}
+
+/// Returns the thickness of a ridge of this width relative to that of wide ones.
+fn of_width(width_um: f64) -> f64 {
+    (width_um / WIDE_UM).min(1.0)
 }
 
 /// Returns the mean of a point of a closed line and of its neighbours up to `reach` points away.
@@ -356,7 +363,8 @@ struct WrinkleProfile {
 struct WrinkleKind {
     /// Minimum and maximum of the width of the crest, µm.
     width_um: [f64; 2],
-    /// Minimum and maximum of the thickness relative to the wrinkles of the cell.
+    /// Minimum and maximum of the thickness relative to the wrinkles of the cell, before the reduction of narrow ridges
+    /// ([`WIDE_UM`]).
     thickness: [f64; 2],
     /// Whether the wrinkle is a pleat.
     pleat: bool,
@@ -371,7 +379,7 @@ impl WrinkleProfile {
         Self {
             width: factor * width_um / cell.pixel_um(),
             pleat: kind.pleat,
-            strength: cell.body.detail.wrinkle_thickness * thickness * (factor * width_um / WIDE_UM).min(1.0),
+            strength: cell.body.detail.wrinkle_thickness * thickness * of_width(factor * width_um),
             side: if random::chance(0.5, rng) { 1.0 } else { -1.0 },
             rise: random::between(0.05, TAPER, rng),
             fall: random::between(0.1, 2.0 * TAPER, rng),
@@ -453,7 +461,7 @@ mod tests {
 
     #[test]
     fn the_mean_of_a_rough_line_is_smooth_and_closed() {
-        let rough = |i: usize| 10.0 + if i % 2 == 0 { 0.5 } else { -0.5 };
+        let rough = |i: usize| 10.0 + if i.is_multiple_of(2) { 0.5 } else { -0.5 };
         let angle = |i: usize| core::f64::consts::TAU * i as f64 / 90.0;
         let line: Vec<Point> =
             (0..90).map(|i| [rough(i) * libm::cos(angle(i)), rough(i) * libm::sin(angle(i))]).collect();
@@ -461,7 +469,14 @@ mod tests {
             assert_eq!(mean_near(&line, i, 0), line[i % 90]);
             let p = mean_near(&line, i, 3);
             assert!((libm::hypot(p[0], p[1]) - 9.9).abs() < 0.15, "{p:?}");
+            // The mean is centred on the point.
+            assert!((p[1] * libm::cos(angle(i)) - p[0] * libm::sin(angle(i))).abs() < 0.15, "{p:?}");
         }
+    }
+
+    #[test]
+    fn narrow_ridges_are_thinner() {
+        assert_eq!([0.3, 0.6, 1.2].map(of_width), [0.5, 1.0, 1.0]);
     }
 
     #[test]
