@@ -15,8 +15,9 @@ const PACKAGES: &str = "numpy\npillow\nscikit-image\nscipy\n\
     tensorflow-cpu; sys_platform == 'linux' and platform_machine == 'x86_64'\n\
     tensorflow; sys_platform != 'linux' or platform_machine != 'x86_64'\n";
 
-/// Number of fields generated for each grade and each of [`LEUKOCYTES`].
-const FRAMES: &str = "40";
+/// Number of fields generated for each of [`GRADES`] and each of [`LEUKOCYTES`]: twice as many normal ones
+/// (docs/WORTH.md).
+const FRAMES: [&str; 3] = ["80", "40", "40"];
 
 /// Changes of the matched recipes for training, beside `--widen`: more variety of cells (docs/WORTH.md).
 const VARIETY: [&str; 6] = [
@@ -45,7 +46,7 @@ const LEUKOCYTES: [(&str, &[&str]); 2] = [
 const WIDEN: &str = "1.5";
 
 /// Version of `nucleus_net.py` and of its sets: results of another version are kept apart.
-const METHOD: u32 = 7;
+const METHOD: u32 = 8;
 
 /// Version of `overlap_net.py` and of its sets: results of another version are kept apart.
 const OVERLAP_METHOD: u32 = 3;
@@ -202,7 +203,7 @@ fn synthetic(workspace: &Workspace, folder: &Path, real: &Path, half: usize, wid
     let partial = folder.join("partial");
     shell::remove(&partial)?;
     shell::make(&partial)?;
-    for (number, (grade, _, preset)) in GRADES.into_iter().enumerate() {
+    for (number, ((grade, _, preset), frames)) in GRADES.into_iter().zip(FRAMES).enumerate() {
         let recipe = folder.join(format!("matched-{METHOD}-{grade}-{half}.toml"));
         if !recipe.exists() {
             let mut fit = program(workspace);
@@ -212,7 +213,7 @@ fn synthetic(workspace: &Workspace, folder: &Path, real: &Path, half: usize, wid
         for (set, (name, leukocytes)) in LEUKOCYTES.into_iter().enumerate() {
             // With one seed for all, the data sets would have the same scenes.
             let seed = (GRADES.len() * (2 * set + half) + number).to_string();
-            let words = ["--frames", FRAMES, "--seed", &seed, "--widen", widen, "--set", "slide.fields_per_slide=1"];
+            let words = ["--frames", frames, "--seed", &seed, "--widen", widen, "--set", "slide.fields_per_slide=1"];
             let words = words.into_iter().chain(["--without", "noise-free,layers,contact-sheet"]);
             let sets = VARIETY.iter().chain(leukocytes).flat_map(|set| ["--set", *set]);
             let words = words.chain(sets).map(PathBuf::from);

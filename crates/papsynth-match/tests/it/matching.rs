@@ -107,9 +107,12 @@ fn a_match_finds_the_parameters_and_does_not_depend_on_the_number_of_threads() {
     let blur = of(&one, Parameter::Blur);
     assert!(blur.fields[3] > 1.15 * blur.fields[0] && blur.spread > 0.08, "{blur:?}");
     // Four fields have few slides, so that the distance of one match depends on its draws: the ratio is 0.5 to 0.8.
-    let other = on_threads(2, &fields, &with_seed(PixelSize::Known(PIXEL_UM), 2, 6));
-    let [after, before] = [one.distance.after + other.distance.after, one.distance.before + other.distance.before];
-    assert!(after < 0.7 * before, "{:?} {:?}", one.distance, other.distance);
+    // Hence the mean of five.
+    let matched = |seed| on_threads(2, &fields, &with_seed(PixelSize::Known(PIXEL_UM), 2, seed)).distance;
+    let distances: Vec<_> = core::iter::once(one.distance).chain([6, 7, 8, 9].map(matched)).collect();
+    let after: f64 = distances.iter().map(|distance| distance.after).sum();
+    let before: f64 = distances.iter().map(|distance| distance.before).sum();
+    assert!(after < 0.7 * before, "{distances:?}");
     assert!(one.statistics.iter().any(|s| s.name == "log nuclei" && s.real.is_finite()));
 
     // The page compares the fields with simulated ones.
