@@ -201,7 +201,7 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
     // Returns the distribution for a value and the initial distribution.
     type Spread = fn(f64, &Number) -> Number;
     let mut single: Vec<(P, &mut Number, Spread)> = vec![
-        (P::BackgroundTexture, &mut r.background.texture, about),
+        (P::BackgroundTexture, &mut r.background.texture, |value, _| number(value)),
         (P::NoiseCorrelationX, &mut r.focus.noise_correlation_x, |value, _| number(value.clamp(0.0, 0.5))),
         (P::NoiseCorrelationY, &mut r.focus.noise_correlation_y, |value, _| number(value.clamp(0.0, 0.5))),
         (P::Depth, &mut r.slide.depth_um, |value, _| number(value)),

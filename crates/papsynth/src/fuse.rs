@@ -13,8 +13,8 @@ mod wavelet;
 
 /// Filters the noise, the difference between grey levels and expected grey levels, so that neighbours are correlated.
 ///
-/// The variance of the noise is unchanged, except just below the highest grey level, and on structure. Input has
-/// `bits[0]`, output `bits[1]`.
+/// The variance of the noise is unchanged, except just below the highest grey level, where the mean is lower too, and
+/// on structure. Input has `bits[0]`, output `bits[1]`.
 pub(crate) fn correlate(
     grey: &mut [u16],
     expected: &mut [f32],
@@ -72,10 +72,10 @@ pub(crate) fn correlate(
     }
     // To first order, this changes only the correlation along the diagonals.
     let skew = (0.5 * fusion.noise_skew / filtered_share(f64::from(centre))) as f32;
-    // Relative noise at equal steps below the highest grey level, where planes are clipped before fusion.
-    let per_level = (STEPS as f64 / (RANGE * (PLANE_NOISE * variance.sqrt()).max(1e-6))) as f32;
-    let remaining: [f32; STEPS + 1] =
-        core::array::from_fn(|step| clipped_normal_sd(RANGE * step as f64 / STEPS as f64) as f32);
+    // Near the highest grey level, planes are clipped before fusion: the mean is lower and the noise weaker.
+    let plane_noise = (PLANE_NOISE * variance.sqrt()).max(1e-6);
+    let clipped = clipped_table(plane_noise);
+    let per_level = (1.0 / plane_noise) as f32;
     for (y, grey) in grey.chunks_exact_mut(row).enumerate() {
         let [above, below] = [-1, 1].map(|step| mirrored(y, step, height) * row);
         for (i, grey) in grey.iter_mut().enumerate() {
@@ -92,13 +92,13 @@ pub(crate) fn correlate(
             let norm =
                 (uncorrelated * uncorrelated + correlated * correlated + 2.0 * uncorrelated * correlated * centre)
                     .sqrt();
-            let step = ((top - expected[at]).max(0.0) * per_level) as usize;
-            let value = remaining[step.min(STEPS)]
+            let [lowered, remaining] = interpolated(&clipped, (top - expected[at]) * per_level);
+            let value = remaining
                 * (uncorrelated * own[at] + correlated * (shared[at] + skew * diagonals))
                 * (1.0 + GAIN * sharp).sqrt()
                 / norm
                 + LINES * structured * lines[at];
-            *grey = (expected[at] + value + 0.5).clamp(0.0, top) as u16;
+            *grey = (expected[at] + lowered + value + 0.5).clamp(0.0, top) as u16;
         }
     }
 }
@@ -198,23 +198,43 @@ const LINES: f32 = 2.2;
 /// level of real EDF images.
 const PLANE_NOISE: f64 = 3.0;
 
-/// Returns the standard deviation of the noise of an EDF image at `below` grey levels under the highest one, where the
-/// planes are clipped before fusion. `sd` is the standard deviation far below it, in grey levels.
+/// Returns the mean of an EDF image, in grey levels below the highest one, and the standard deviation of its noise,
+/// where its planes are clipped before fusion. `below` is the mean without clipping, at least 0, and `sd` the standard
+/// deviation far below the highest level.
 #[must_use]
-pub fn clipped_noise(sd: f64, below: f64) -> f64 {
-    sd * clipped_normal_sd(below.max(0.0) / (PLANE_NOISE * sd).max(1e-6))
+pub fn clipped_noise(below: f64, sd: f64) -> [f64; 2] {
+    let of_planes = (PLANE_NOISE * sd).max(1e-6);
+    let [mean, remaining] = clipped_normal(below.max(0.0) / of_planes);
+    [below - of_planes * mean, sd * remaining]
 }
 
-/// Number of steps of the table of clipped noise, and its range in standard deviations.
+/// Number of steps of the table of clipped noise, and its range below the highest grey level in standard deviations.
 const STEPS: usize = 64;
 const RANGE: f64 = 4.0;
 
-/// Returns the standard deviation of min(n, `max`) for a standard normal deviate n.
-fn clipped_normal_sd(max: f64) -> f64 {
+/// Returns the changes of the mean, and the remaining parts of the standard deviation, of noise with this standard
+/// deviation that is clipped, for equal steps of the clipping level from 0 to [`RANGE`].
+fn clipped_table(sd: f64) -> [[f32; 2]; STEPS + 1] {
+    core::array::from_fn(|step| {
+        let [mean, remaining] = clipped_normal(RANGE * step as f64 / STEPS as f64);
+        [(sd * mean) as f32, remaining as f32]
+    })
+}
+
+/// Interpolates linearly in a [`clipped_table`]. `max` is the clipping level in standard deviations.
+fn interpolated(table: &[[f32; 2]; STEPS + 1], max: f32) -> [f32; 2] {
+    let step = (max * (STEPS as f32 / RANGE as f32)).clamp(0.0, STEPS as f32);
+    let index = (step as usize).min(STEPS - 1);
+    let (before, after, t) = (table[index], table[index + 1], step - index as f32);
+    [0, 1].map(|i| before[i] + t * (after[i] - before[i]))
+}
+
+/// Returns the mean and the standard deviation of min(n, `max`) for a standard normal deviate n.
+fn clipped_normal(max: f64) -> [f64; 2] {
     let density = libm::exp(-0.5 * max * max) / (2.0 * core::f64::consts::PI).sqrt();
     let below = 0.5 * libm::erfc(-max * core::f64::consts::FRAC_1_SQRT_2);
     let (mean, square) = (max * (1.0 - below) - density, below - max * density + max * max * (1.0 - below));
-    (square - mean * mean).max(0.0).sqrt()
+    [mean, (square - mean * mean).max(0.0).sqrt()]
 }
 
 /// Returns the structure around every pixel: half the mean square of noise-free differences four pixels apart.
@@ -480,14 +500,17 @@ mod tests {
     }
 
     #[test]
-    fn clipped_normal_sd_matches_clipped_samples() {
+    fn clipped_noise_matches_clipped_samples() {
         let mut rng = Key { seed: 5, index: 0 }.stream("test", 0, "noise");
+        let table = clipped_table(1.0);
         for max in [0.0, 0.9, 2.0] {
             let drawn: Vec<f64> = (0..100_000).map(|_| random::normal(&mut rng).min(max)).collect();
             let mean = drawn.iter().sum::<f64>() / 1e5;
             let sd = (drawn.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / 1e5).sqrt();
-            assert!((clipped_normal_sd(max) - sd).abs() < 0.01, "{max}: {sd}");
+            let found = interpolated(&table, max as f32).map(f64::from);
+            assert!((found[0] - mean).abs() < 0.015 && (found[1] - sd).abs() < 0.01, "{max}: {mean} {sd} {found:?}");
         }
-        assert!((clipped_normal_sd(6.0) - 1.0).abs() < 1e-6);
+        let [mean, sd] = clipped_normal(6.0);
+        assert!(mean.abs() < 1e-6 && (sd - 1.0).abs() < 1e-6);
     }
 }

@@ -35,21 +35,26 @@ fn fields(count: u64, from: NucleiFrom, apart: f64) -> Vec<FieldImage> {
 fn fields_of(setting: &Setting, count: u64, from: NucleiFrom, apart: f64) -> Vec<FieldImage> {
     let sampler = Sampler::new(setting.size_px, PIXEL_UM, from, Detail::Statistics).unwrap();
     let field = |index: u64| {
-        let mut values = setting.base_values();
         let off = index as f64 - 0.5 * (count - 1) as f64;
-        for (parameter, value) in [
-            (Parameter::Level, 0.8 + 0.01 * off),
-            (Parameter::Noise, 3.0),
-            (Parameter::NoiseCorrelationY, 0.3),
-            (Parameter::Blur, 0.5 * libm::exp(apart * off)),
-            (Parameter::Cells, 400.0),
-        ] {
-            values.set(parameter, value);
-        }
-        let engine = engine(&recipe(setting, &values, |_| true)).unwrap();
+        let engine = engine(&truth(setting, off, apart)).unwrap();
         sampler.simulate(&engine, None, Key { seed: 11, index }, &Control::NONE).unwrap()
     };
     (0..count).map(field).collect()
+}
+
+/// Returns the recipe of a field that is `off` from the mean in level and, times `apart`, in the logarithm of blur.
+fn truth(setting: &Setting, off: f64, apart: f64) -> Recipe {
+    let mut values = setting.base_values();
+    for (parameter, value) in [
+        (Parameter::Level, 0.8 + 0.01 * off),
+        (Parameter::Noise, 3.0),
+        (Parameter::NoiseCorrelationY, 0.3),
+        (Parameter::Blur, 0.5 * libm::exp(apart * off)),
+        (Parameter::Cells, 400.0),
+    ] {
+        values.set(parameter, value);
+    }
+    recipe(setting, &values, |_| true)
 }
 
 fn small(pixel: PixelSize, rounds: usize) -> Match {
@@ -106,13 +111,17 @@ fn a_match_finds_the_parameters_and_does_not_depend_on_the_number_of_threads() {
     assert!((level.fields[3] - level.fields[0] - 0.03).abs() < 0.015, "{level:?}");
     let blur = of(&one, Parameter::Blur);
     assert!(blur.fields[3] > 1.15 * blur.fields[0] && blur.spread > 0.08, "{blur:?}");
-    // Four fields have few slides, so that the distance of one match depends on its draws: the ratio is 0.5 to 0.8.
-    // Hence the mean of five.
-    let matched = |seed| on_threads(2, &fields, &with_seed(PixelSize::Known(PIXEL_UM), 2, seed)).distance;
-    let distances: Vec<_> = core::iter::once(one.distance).chain([6, 7, 8, 9].map(matched)).collect();
-    let after: f64 = distances.iter().map(|distance| distance.after).sum();
-    let before: f64 = distances.iter().map(|distance| distance.before).sum();
-    assert!(after < 0.7 * before, "{distances:?}");
+    // Fields of the true recipe are as far from these four as four and sixteen fields are. Both matches together remove
+    // at least half of the rest of the distance; each depends on its draws.
+    let other = on_threads(2, &fields, &with_seed(PixelSize::Known(PIXEL_UM), 2, 6));
+    let floors = [5, 6].map(|seed| {
+        let params = MatchParams { pixel: PixelSize::Known(PIXEL_UM), simulations: 60, rounds: 0, refine: 0, seed };
+        on_threads(2, &fields, &Match::new(&params, &truth(&setting(FIELD), 0.0, 0.0)).unwrap()).distance.before
+    });
+    let distances = [one.distance, other.distance];
+    let excess = |of: &dyn Fn(usize) -> f64| (0..2).map(|i| of(i) - floors[i]).sum::<f64>();
+    let [before, after] = [excess(&|i| distances[i].before), excess(&|i| distances[i].after)];
+    assert!(before > 0.2 && after < 0.5 * before, "{distances:?} {floors:?}");
     assert!(one.statistics.iter().any(|s| s.name == "log nuclei" && s.real.is_finite()));
 
     // The page compares the fields with simulated ones.

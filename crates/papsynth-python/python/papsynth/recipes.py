@@ -490,12 +490,11 @@ class Cytoplasm(Section):
 
     clouds: Number | None = None
     """Amplitude of the first level of detail, low-frequency noise, relative to the absorbance of the cytoplasm. Dark
-    places are smaller and stronger than pale ones. In cells with clouds of any amplitude, the fine texture is stronger
-    in dark places. From 0 to 2.
+    places are smaller and stronger than pale ones. From 0 to 2.
     """
 
     clouds_um: Number | None = None
-    """Standard deviation of the smoothing of that noise: two noise fields with 1.2 and 0.7 times this number, each
+    """Standard deviation of the smoothing of that noise: two noise fields with 1.2 and 0.6 times this number, each
     stretched in a direction of its own. From 0.1 to 100 µm.
     """
 
@@ -537,8 +536,9 @@ class Cytoplasm(Section):
     """
 
     degeneration: Number | None = None
-    """Degeneration: dark granular material at the rim and in patches, and a frayed rim. The number is the absorbance of
-    the material relative to the cytoplasm. Above 1, the material covers the cell. From 0 to 5.
+    """Degeneration: dark granular material at the rim and in patches, and a frayed rim. For a degeneration s, the
+    absorbance of the material relative to the cytoplasm is s/(1 + s). From s = 1, material covers the cell. From 0 to
+    5.
     """
 
     fray_um: Number | None = None

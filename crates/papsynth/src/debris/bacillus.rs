@@ -16,13 +16,13 @@ section! {
         /// Length of a bacillus.
         length_um: Number = Number::log_normal(2.4, 0.45), 0.3..=50, "µm";
         /// Width of a bacillus.
-        width_um: Number = Number::log_normal(0.58, 0.18), 0.1..=5, "µm";
+        width_um: Number = Number::log_normal(0.58, 0.25), 0.1..=5, "µm";
         /// Bend of a bacillus.
         bend_deg: Number = Number::uniform(0.0, 60.0), 0..=120, "degrees between its ends";
         /// Fraction of the bacilli that are in chains of two to four.
         chained: Number (given usize as rods: "Number of rods in a chain.") = 0.05, 0..=1;
         /// Absorbance.
-        absorbance: Number = Number::log_normal(0.09, 0.35), 0..=4;
+        absorbance: Number = Number::log_normal(0.06, 0.55), 0..=4;
         /// Phase delay; has an effect only with bright-field optics.
         phase_rad: Number (given f64) = Number::uniform(0.1, 0.25), -3..=3, "radians of phase";
     }

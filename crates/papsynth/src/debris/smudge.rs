@@ -35,7 +35,7 @@ section! {
         /// Dyes.
         dyes: DyeAmounts = DyeAmounts { light_green: 1.0, haematein: 0.35, eosin_y: 0.6, orange_g: 0.3, neutral: 0.2 };
         /// Probability that a clump is a fibrous shred.
-        fibrous: Number (Chance as fibrous: "Whether it is a fibrous shred.") = 0.25, 0..=1;
+        fibrous: Number (Chance as fibrous: "Whether it is a fibrous shred.") = 0.1, 0..=1;
         /// Fraction of the clumps that collect at leukocytes, most of them between those of a cluster; these are darker
         /// and larger.
         at_leukocytes: Number (undrawn) = 0.4, 0..=1;
@@ -100,7 +100,7 @@ const PARTS: usize = 4;
 /// Standard deviation of the curvature of a shred: displacement at its ends relative to its half length.
 const BEND: f64 = 0.25;
 /// Standard deviation of the directions of fibres, radians.
-const FAN: f64 = 0.12;
+const FAN: f64 = 0.4;
 
 impl Smudge {
     /// Returns the clump with other values; those outside the limits move towards them, but not beyond.

@@ -298,10 +298,9 @@ section! {
         /// Additional thickness of the inner cytoplasm, relative to the rest: 1.4 times this number.
         endoplasm: Number (given f64) = Number::log_normal(0.4, 0.5).at_most(1.5), 0..=2;
         /// Amplitude of the first level of detail, low-frequency noise, relative to the absorbance of the cytoplasm.
-        /// Dark places are smaller and stronger than pale ones. In cells with clouds of any amplitude, the fine texture
-        /// is stronger in dark places.
+        /// Dark places are smaller and stronger than pale ones.
         clouds: Number = Number::uniform(0.045, 0.17), 0..=2;
-        /// Standard deviation of the smoothing of that noise: two noise fields with 1.2 and 0.7 times this number, each
+        /// Standard deviation of the smoothing of that noise: two noise fields with 1.2 and 0.6 times this number, each
         /// stretched in a direction of its own.
         clouds_um: Number = Number::log_normal(4.0, 0.7).at_least(0.7).at_most(14.0), 0.1..=100, "µm";
         /// Length of the clouds relative to their width, with the same area; 1 for round clouds.
@@ -327,8 +326,9 @@ section! {
             (given f64 as granules: "Number of granules per 100 µm², 0 if the cell is not granular.") = Number::log_normal(12.0, 0.6), 0..=1000;
         /// Number of specks per 100 µm²: dark dots and short rods, such as granules, or bacteria on the cell.
         specks: Number = Number::log_normal(1.5, 0.9).at_most(15.0), 0..=1000;
-        /// Degeneration: dark granular material at the rim and in patches, and a frayed rim. The number is the
-        /// absorbance of the material relative to the cytoplasm. Above 1, the material covers the cell.
+        /// Degeneration: dark granular material at the rim and in patches, and a frayed rim. For a
+        /// degeneration s, the absorbance of the material relative to the cytoplasm is s/(1 + s). From s = 1, material
+        /// covers the cell.
         degeneration: Number (given f64) = 0.0, 0..=5;
         /// Amplitude of the irregularity of the outline.
         fray_um: Number = Number::log_normal(0.65, 0.45), 0..=5, "µm";
@@ -455,7 +455,7 @@ section! {
         /// Factor by which the standard deviations of the strength of the fine texture of cytoplasm, between cells and
         /// between fields, are multiplied. Drawn once per field. The outer and the inner cytoplasm of a cell have a
         /// strength each. Between fields, half of the deviation of the model counts.
-        texture_variation: Number = 1.5, 0..=5;
+        texture_variation: Number = 1.1, 0..=5;
         /// Variation of the dye balance between slides: standard deviation of the logarithm of each dye's amount.
         slide_balance: Number = 0.15, 0..=2;
         /// Variation of the dye balance between the fields of a slide, as `slide_balance`.

@@ -3,6 +3,7 @@
 
 use cloth_verlet::{Crease, FoldKind, PixelGrid, Sheet, SheetSpec, Wave, crease_outline};
 
+mod degeneration;
 mod detail;
 mod fine_texture;
 mod halo;
@@ -226,7 +227,7 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
     detail::add_detail(&mut absorbance, &coverage, inner, cell, &mut rng)?;
     let lines = &mut canvas[..coverage.values.len()];
     detail::add_cytoskeleton(&mut absorbance, &plan.outline, cell, lines, &mut rng)?;
-    detail::add_degeneration(&mut absorbance, &coverage, cell);
+    degeneration::add(&mut absorbance, &coverage, cell);
     specks::add_specks(&mut absorbance, cell);
     specks::add_granules(&mut absorbance, body.detail.granules, pixel_um, &mut rng);
     // Eq. 12: A = κ·c·l.

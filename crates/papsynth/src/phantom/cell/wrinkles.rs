@@ -35,8 +35,8 @@ const ALONG_RIM: f64 = 0.4;
 /// follow less of the shape of the rim.
 const SMOOTHED: f64 = 3.0;
 
-/// Width from which a ridge has its full thickness; a narrower one is thinner in proportion. Ridges beside the first
-/// one of a bundle are reduced by the width of that one. Set by eye: most dark folds of real cells are wide.
+/// Width from which a ridge has its full thickness; a narrower one is thinner in proportion. Set by eye: most
+/// dark folds of real cells are wide.
 const WIDE_UM: f64 = 0.6;
 
 /// Thickness and width of another wrinkle relative to the mean: minimum, maximum.
@@ -60,7 +60,7 @@ const BESIDE: [usize; 2] = [1, 3];
 const APART_UM: [f64; 2] = [0.9, 2.2];
 /// Width of these ridges (standard deviation of the profile), µm: minimum, maximum.
 const FINE_UM: [f64; 2] = [0.25, 0.5];
-/// Thickness of a ridge beside the first one, relative to it: minimum, maximum.
+/// Thickness of a ridge beside the first one, relative to it if both have the same width: minimum, maximum.
 const FAINTER: [f64; 2] = [0.4, 1.0];
 
 /// Width of a wrinkle at its ends relative to its middle.
@@ -177,13 +177,14 @@ fn bundle(path: Vec<Point>, side: f64, kind: &WrinkleKind, cell: &CellContext<'_
     let mut first = WrinkleProfile::new(path.len(), kind, cell, rng);
     // The gentle slope of the first ridge is outside the bundle.
     first.side = -side;
-    let (fan, mut distance) = (random::between(-FAN, FAN, rng), 0.0);
+    let (fan, mut distance, pixel_um) = (random::between(-FAN, FAN, rng), 0.0, cell.pixel_um());
     let mut ridges = Vec::new();
     for _ in 0..BESIDE[0] + random::below(BESIDE[1], rng) {
-        distance += side * random::between(APART_UM[0], APART_UM[1], rng) / cell.pixel_um();
+        distance += side * random::between(APART_UM[0], APART_UM[1], rng) / pixel_um;
         let path = part(&beside(&path, distance, fan), random::between(SHORTEST, 1.0, rng), rng);
         let profile = WrinkleProfile::new(path.len(), kind, cell, rng);
-        let strength = first.strength * random::between(FAINTER[0], FAINTER[1], rng);
+        let relative = of_width(profile.width * pixel_um) / of_width(first.width * pixel_um);
+        let strength = first.strength * relative * random::between(FAINTER[0], FAINTER[1], rng);
         ridges.push(Wrinkle { path, profile: WrinkleProfile { strength, side, ..profile } });
     }
     ridges.push(Wrinkle { path, profile: first });
