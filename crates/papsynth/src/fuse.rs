@@ -404,6 +404,20 @@ mod tests {
     }
 
     #[test]
+    fn just_below_the_highest_level_the_mean_is_lower_and_the_noise_weaker() {
+        // Grey levels of 8 bits below the highest one, from planes of 16 bits. Nearer to it, planes are clipped twice.
+        for below in [6.0, 12.0, 40.0] {
+            let level = (257.0 * (255.0 - below)) as f32;
+            let (noise, square) = fused(|_| level, 257.0 * 2.6, 0.0, [16, 8]);
+            let mean = noise.iter().sum::<f64>() / noise.len() as f64;
+            let sd = (square - mean * mean - ROUNDING).sqrt();
+            let [found, expected] = [[below - mean, sd], clipped_noise(below, 2.6)];
+            assert!((found[0] - expected[0]).abs() < 0.1, "{below}: {found:?} {expected:?}");
+            assert!((found[1] / expected[1] - 1.0).abs() < 0.04, "{below}: {found:?} {expected:?}");
+        }
+    }
+
+    #[test]
     fn filters_give_the_correlations_of_the_sum() {
         let correlations = [0.0, 0.2, 0.45, 0.5];
         for wanted in correlations.into_iter().flat_map(|x| correlations.map(|y| [x, y])) {
