@@ -15,11 +15,14 @@ const NORMAL_ABOVE_E: f64 = 400.0;
 /// Full-well capacity relative to the charge of the highest grey level: the converter clips first, as in real cameras.
 const WELL_MARGIN: f64 = 1.02;
 
-/// Largest full-well capacity of the camera model, electrons.
+/// Largest full-well capacity of the camera model after binning, electrons.
 const MAX_WELL_E: f64 = 1e7;
 
 /// Bit depth of the converter of a camera that computes colours or fused planes from its grey levels.
 const INNER_BITS: u32 = 16;
+
+/// Highest grey level of planes for fusion relative to that of the image, so that their noise is not clipped.
+const HEADROOM: f64 = 1.25;
 
 /// The identity matrix: sensor colours without conversion.
 const UNCHANGED: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -27,8 +30,8 @@ const UNCHANGED: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1
 /// The camera of a scene.
 pub(crate) struct Detector {
     channels: Vec<Channel>,
-    /// Bit depth of its grey levels; planes for fusion have more bits than the final image.
-    pub(crate) bits: u32,
+    /// Grey level of light 1. Planes for fusion have more bits than the final image, and levels above this one.
+    pub(crate) full_scale: f32,
     /// Conversion of the channels to colours, if any.
     srgb: Option<Srgb>,
     jpeg: Option<Jpeg>,
@@ -107,26 +110,30 @@ impl Detector {
         };
         let jpeg = (camera.jpeg_quality > 0).then(|| Jpeg::new(&params)).transpose()?;
         // Fusion rounds once more, so the planes keep more bits.
-        let plane_bits = if scene.fusion.is_some() { INNER_BITS } else { camera.bits };
+        let (plane_bits, headroom) = if scene.fusion.is_some() { (INNER_BITS, HEADROOM) } else { (camera.bits, 1.0) };
+        let full_scale = |bits: u32, headroom: f64| (highest(bits) / headroom) as f32;
         match scene.light {
             SceneLight::Monochrome { .. } => {
-                let channels = vec![Channel::new(&camera, plane_bits, 1.0)?];
-                Ok(Self { channels, bits: plane_bits, srgb: None, jpeg })
+                let channels = vec![Channel::new(&camera, plane_bits, 1.0, headroom)?];
+                let full_scale = full_scale(plane_bits, headroom);
+                Ok(Self { channels, full_scale, srgb: None, jpeg })
             }
             SceneLight::Colour { rendition, lamp_k, mixing, .. } => {
                 let colour = colour(lamp_k, mixing)?;
-                let (bits, output_bits) = match rendition {
-                    Rendition::Raw => (plane_bits, plane_bits),
-                    Rendition::Display | Rendition::Srgb => (INNER_BITS, camera.bits),
+                // The conversion to colours clips at the highest level.
+                let (bits, output_bits, headroom) = match rendition {
+                    Rendition::Raw => (plane_bits, plane_bits, headroom),
+                    Rendition::Display | Rendition::Srgb => (INNER_BITS, camera.bits, 1.0),
                 };
-                let channel = |of: &dye_spectra::Channel| Channel::new(&camera, bits, of.relative_light);
+                let channel = |of: &dye_spectra::Channel| Channel::new(&camera, bits, of.relative_light, headroom);
                 let channels = colour.channels().iter().map(channel).collect::<Result<_, _>>()?;
                 let srgb = match rendition {
                     Rendition::Raw => None,
                     Rendition::Display => Some(Srgb::new(&UNCHANGED, INNER_BITS, camera.bits)),
                     Rendition::Srgb => Some(Srgb::new(colour.to_srgb(), INNER_BITS, camera.bits)),
                 };
-                Ok(Self { channels, bits: output_bits, srgb, jpeg })
+                let full_scale = full_scale(output_bits, headroom);
+                Ok(Self { channels, full_scale, srgb, jpeg })
             }
         }
     }
@@ -245,11 +252,13 @@ impl Detector {
 }
 
 impl Channel {
-    /// `relative_light` is the light of the channel relative to the brightest channel.
-    fn new(camera: &SceneCamera, bits: u32, relative_light: f64) -> Result<Self, ErrorKind> {
-        let largest = libm::exp2(f64::from(bits)) - 1.0;
-        let offset_dn = camera.offset_dn * libm::exp2(f64::from(bits) - f64::from(camera.bits));
-        let (range_dn, glare) = (largest - offset_dn, camera.glare_subtracted);
+    /// `relative_light` is the light of the channel relative to the brightest channel, `headroom` the highest grey
+    /// level relative to that of light 1.
+    fn new(camera: &SceneCamera, bits: u32, relative_light: f64, headroom: f64) -> Result<Self, ErrorKind> {
+        let side = camera.binning_px as usize;
+        let full_scale = highest(bits) / headroom;
+        let offset_dn = camera.offset_dn * libm::exp2(f64::from(bits) - f64::from(camera.bits)) / headroom;
+        let (range_dn, glare) = (full_scale - offset_dn, camera.glare_subtracted);
         let params = CameraParams {
             exposure_s: camera.exposure_s,
             dark_current_e_per_s: camera.dark_current_e_per_s,
@@ -259,7 +268,7 @@ impl Channel {
             prnu: camera.prnu,
             dsnu_e: camera.dsnu_e,
             serial: camera.serial,
-            full_well_e: (camera.full_well_e * WELL_MARGIN).min(MAX_WELL_E),
+            full_well_e: (camera.full_well_e * WELL_MARGIN * headroom).min(MAX_WELL_E / (side * side) as f64),
             blooming: match camera.blooming {
                 0.0 => Blooming::Off,
                 fraction => Blooming::On { vertical: camera.blooming_vertical, anti_blooming: 1.0 - fraction },
@@ -279,7 +288,6 @@ impl Channel {
             },
             ..CameraParams::default()
         };
-        let side = camera.binning_px as usize;
         let binned = match (side, camera.binning) {
             (1, _) => Ok(params),
             (_, Binning::Charge) => params.binned(ccd_noise::Binning::Charge { side }),
@@ -289,6 +297,11 @@ impl Channel {
         let full_scale_e = range_dn / (1.0 - glare) * camera.electrons_per_dn();
         Ok(Self { camera, full_scale_e, glare })
     }
+}
+
+/// Returns the highest grey level of a number of bits.
+pub(crate) fn highest(bits: u32) -> f64 {
+    libm::exp2(f64::from(bits)) - 1.0
 }
 
 /// Interleaves the values of several channels.
@@ -345,9 +358,8 @@ const LANES: usize = 16;
 impl Srgb {
     /// `matrix` converts the channels to linear sRGB; input has `inner_bits`, output has `bits`.
     fn new(matrix: &[[f64; 3]; 3], inner_bits: u32, bits: u32) -> Self {
-        let largest = |bits: u32| libm::exp2(f64::from(bits)) - 1.0;
-        let scale = 1.0 / largest(inner_bits);
-        Self { matrix: matrix.map(|row| row.map(|v| (scale * v) as f32)), largest: largest(bits) as f32 }
+        let scale = 1.0 / highest(inner_bits);
+        Self { matrix: matrix.map(|row| row.map(|v| (scale * v) as f32)), largest: highest(bits) as f32 }
     }
 
     /// Writes the colours of pixels, interleaved; `store` converts grey levels, 0 to the highest level.
@@ -446,7 +458,7 @@ mod tests {
         let colour = colour(3200.0, Mixing::Spectral).unwrap();
         for (matrix, bits) in [(colour.to_srgb(), 8), (&UNCHANGED, 12), (&UNCHANGED, 16)] {
             let srgb = Srgb::new(matrix, 16, bits);
-            let highest = libm::exp2(f64::from(bits)) - 1.0;
+            let highest = highest(bits);
             for pixels in [1, LANES, 5 * LANES + 3, 70_000] {
                 let level = |i: usize, channel: usize| (i * [1, 7, 11][channel] + 300 * channel) as u16;
                 let levels = [0, 1, 2].map(|channel| (0..pixels).map(|i| level(i, channel)).collect::<Vec<_>>());

@@ -18,7 +18,8 @@ pub struct Plane {
     pub grey: Vec<u16>,
     /// Expected grey level of each pixel: without noise, before rounding.
     pub noise_free: Vec<f32>,
-    /// Pixels at full-well capacity or at the highest converter level in at least one channel.
+    /// Pixels at full-well capacity or at the highest converter level in at least one channel; in an EDF image, pixels
+    /// with the highest grey level.
     pub saturated: Mask,
     /// Number of pixels that the optics model clipped to its minimum light, next to very dark objects.
     pub clipped_px: usize,

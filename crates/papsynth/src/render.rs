@@ -3,7 +3,7 @@
 use optics_psf::{Border, Gaussian, Scratch};
 use rand_core::Rng;
 
-use crate::detect::{Detector, ExposureBuffers, sum_over};
+use crate::detect::{Detector, ExposureBuffers, highest, sum_over};
 use crate::error::ErrorKind;
 use crate::frame::{Finished, Plane};
 use crate::fuse;
@@ -211,11 +211,16 @@ impl Rendering {
             });
             self.detector.finish(&mut plane.grey, exposure);
             if let Some(fusion) = &scene.fusion {
-                let bits = [self.detector.bits, scene.camera.bits];
-                fuse::correlate(&mut plane.grey, &mut plane.noise_free, view.width, channels, fusion, bits);
+                let tops = [self.detector.full_scale, highest(scene.camera.bits) as f32];
+                fuse::correlate(&mut plane.grey, &mut plane.noise_free, view.width, channels, fusion, tops);
             }
+            plane.saturated = match scene.fusion {
+                Some(_) => {
+                    fuse::saturated(&plane.grey, view.width * channels, channels, highest(scene.camera.bits) as u16)
+                }
+                None => exposure.saturated(),
+            };
             self.detector.compress(view.width, &mut plane.grey);
-            plane.saturated = exposure.saturated();
         });
         self.detectability.push(self.detectabilities(&stats.absorbances, &electrons));
         plane

@@ -472,7 +472,7 @@ class Cytoplasm(Section):
 
     wrinkles: Number | None = None
     """Number of wrinkles: ridges, pleats and bundles of fine ridges. An eighth of them are rolled stretches of the rim.
-    Two fifths are bundles, whose ridges have a width of 0.25 to 0.5 µm. From 0 to 100.
+    A quarter to a third are bundles, whose ridges have a width of 0.25 to 0.5 µm. From 0 to 100.
     """
 
     wrinkle_thickness: Number | None = None
@@ -545,7 +545,9 @@ class Cytoplasm(Section):
     """Amplitude of the irregularity of the outline. From 0 to 5 µm."""
 
     rim_um: Number | None = None
-    """Width of the marginal zone in which the sheet becomes thinner. From 0 to 10 µm."""
+    """Width of the marginal zone in which the sheet becomes thinner. The thickness increases exponentially with the
+    distance from the rim: at this distance, it is 86 % of that far from the rim. From 0 to 10 µm.
+    """
 
     thickness_gradient: Number | None = None
     """Gradient of the thickness of the sheet: standard deviation of the relative change over the radius of the cell.
@@ -803,6 +805,16 @@ class Focus(Section):
     """Half the difference between the correlations of the noise along the two diagonals (down right minus down left),
     in an EDF image. Images that were rotated or shifted by fractions of a pixel have such a difference. From -0.1 to
     0.1.
+    """
+
+    reduction: Number | None = None
+    """Factor by which an EDF image was reduced from the pixels of the sensor, by linear interpolation. Above 1, the
+    variance of the noise changes along rows and columns, with a period of 1/(reduction − 1) pixels. From 1 to 1.3.
+    """
+
+    column_pattern: Number | None = None
+    """Difference between the responses of even columns of the sensor and the mean of all columns, as a fraction of the
+    mean, in the last row of an EDF image. It is proportional to the number of the row. From 0 to 0.05.
     """
 
 

@@ -56,7 +56,10 @@ impl Bacilli {
 const PARTS: usize = 6;
 
 /// Standard deviation of the angle between the rods of a chain, radians.
-const KINK: f64 = 0.35;
+const KINK: f64 = 0.2;
+
+/// Bend of the rods of a chain, relative to that of single rods.
+const CHAIN_BEND: f64 = 0.4;
 
 /// Width of a chain between two rods, relative to the rods.
 const WAIST: f64 = 0.7;
@@ -69,7 +72,7 @@ impl Bacillus {
     pub(super) fn phantom(&self, context: &ObjectContext<'_>) -> Phantom {
         let half_width = 0.5 * context.px(self.width_um);
         let length = context.px((self.length_um - self.width_um).max(0.0));
-        let bend = self.bend_deg.to_radians();
+        let bend = self.bend_deg.to_radians() * if self.rods > 1 { CHAIN_BEND } else { 1.0 };
         let mut rng = context.stream("chain.shape");
         let mut rods: Vec<Vec<Point>> = vec![spine(length, bend)];
         for _ in 1..self.rods {

@@ -20,7 +20,7 @@ section! {
         /// Fraction of the flecks that are aligned with the direction of their cluster.
         aligned: Number (undrawn) = 0.6, 0..=1;
         /// Absorbance.
-        absorbance: Number = Number::log_normal(0.028, 0.5).at_least(0.01).at_most(0.15), 0..=4;
+        absorbance: Number = Number::log_normal(0.035, 0.5).at_least(0.01).at_most(0.2), 0..=4;
         /// Phase delay; has an effect only with bright-field optics.
         phase_rad: Number = Number::uniform(0.0, 0.12), -3..=3, "radians of phase";
         /// Dyes.
@@ -36,16 +36,27 @@ const KINK: f64 = 0.7;
 /// Standard deviation of the depths in a cluster, µm.
 const DEPTH_SD_UM: f64 = 1.2;
 
-/// Standard deviation of the directions of aligned flecks, degrees.
+/// Standard deviation of the directions of aligned flecks in a cluster, degrees.
 const DIRECTION_SD_DEG: f64 = 14.0;
+/// Standard deviation of the directions of clusters in a field, degrees.
+const CLUSTER_DIRECTION_SD_DEG: f64 = 30.0;
+
+/// Width and absorbance of the end of a fleck, relative to its beginning.
+const END: f64 = 0.4;
+
+/// Returns width and absorbance at a part of the length of a fleck, relative to its beginning.
+fn along(part: f64) -> f64 {
+    1.0 - (1.0 - END) * part
+}
 
 impl Dirt {
     pub(super) fn draw(&self, placer: &mut KindPlacer<'_, Fleck>) {
         let dyes = placer.dyes(&self.dyes);
+        let field_deg = random::between(0.0, 360.0, &mut placer.stream(0, "direction"));
         for index in 0..placer.count(named!(self.clusters)) {
             let mut rng = placer.stream(index, "drift");
             let cluster = placer.cluster(&Number::Fixed(0.0), &self.cluster_radius_um, &mut rng);
-            let direction_deg = random::between(0.0, 360.0, &mut rng);
+            let direction_deg = field_deg + CLUSTER_DIRECTION_SD_DEG * random::normal(&mut rng);
             for member in 0..self.per_cluster.draw_count(&mut rng).max(1) as u64 {
                 let number = member_number(index, member);
                 let mut rng = placer.stream(number, "body");
@@ -70,22 +81,23 @@ impl Fleck {
 
     pub(super) fn phantom(&self, context: &ObjectContext<'_>) -> Phantom {
         let mut rng = context.stream("shape");
-        // A few connected strokes with different widths and directions.
+        // A few connected strokes with different directions, thinner and paler from one end to the other.
         let count = 2 + random::below(MAX_STROKES - 1, &mut rng);
         let step = (self.length_um - self.width_um) / count as f64;
         let (mut at, mut heading) = ([-0.5 * step * count as f64, 0.0], KINK * random::normal(&mut rng));
         let mut joints: Vec<(Point, f64)> = Vec::with_capacity(count + 1);
-        for _ in 0..=count {
-            joints.push((context.to_grid(at), context.px(0.5 * self.width_um * random::between(0.35, 1.0, &mut rng))));
+        for number in 0..=count {
+            let width_um = self.width_um * random::between(0.5, 1.0, &mut rng) * along(number as f64 / count as f64);
+            joints.push((context.to_grid(at), context.px(0.5 * width_um)));
             at = [at[0] + step * libm::cos(heading), at[1] + step * libm::sin(heading)];
             heading = 0.5 * heading + KINK * random::normal(&mut rng);
         }
         let mut canvas = context.canvas(joints.iter().map(|(at, _)| at), 0.5 * self.width_um);
-        for pair in joints.windows(2) {
+        for (number, pair) in joints.windows(2).enumerate() {
             let [(from, first), (to, last)] = [pair[0], pair[1]];
-            canvas.stroke(&Stroke { ends: [from, to], half_widths: [first, last] }, 0.0);
+            let absorbance = self.absorbance * along((number as f64 + 0.5) / count as f64);
+            canvas.stroke_max(&Stroke { ends: [from, to], half_widths: [first, last] }, absorbance);
         }
-        canvas.fill_covered(self.absorbance);
         canvas.into_phantom(self.dyes, self.phase_rad, self.absorbance)
     }
 }

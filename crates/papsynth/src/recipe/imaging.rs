@@ -40,6 +40,12 @@ section! {
         /// Half the difference between the correlations of the noise along the two diagonals (down right minus down
         /// left), in an EDF image. Images that were rotated or shifted by fractions of a pixel have such a difference.
         noise_correlation_diagonal: Number = 0.0, -0.1..=0.1;
+        /// Factor by which an EDF image was reduced from the pixels of the sensor, by linear interpolation. Above 1,
+        /// the variance of the noise changes along rows and columns, with a period of 1/(reduction − 1) pixels.
+        reduction: Number = 1.0, 1..=1.3;
+        /// Difference between the responses of even columns of the sensor and the mean of all columns, as a fraction of
+        /// the mean, in the last row of an EDF image. It is proportional to the number of the row.
+        column_pattern: Number = 0.0, 0..=0.05;
     }
 }
 

@@ -79,6 +79,8 @@ impl Preset {
 impl Recipe {
     /// Returns the same slide as an EDF image of a scanner: with the focus, blur, softness of edges, noise, texture and
     /// staining strength of [`Preset::ExtendedFocus`], and no objects out of focus.
+    ///
+    /// The reduction and the pattern of columns are those of one camera; for another one, set them to 1 and 0.
     #[must_use]
     pub fn fused(mut self) -> Self {
         let like = Preset::ExtendedFocus.recipe();

@@ -288,7 +288,7 @@ section! {
         /// where the sheet stands up along its rim or a fold. 100 means no limit, as in the paper.
         ridges: Number (given f64) = 0.25, 0..=100;
         /// Number of wrinkles: ridges, pleats and bundles of fine ridges. An eighth of them are rolled stretches of the
-        /// rim. Two fifths are bundles, whose ridges have a width of 0.25 to 0.5 µm.
+        /// rim. A quarter to a third are bundles, whose ridges have a width of 0.25 to 0.5 µm.
         wrinkles: Number (given usize) = Number::log_normal(15.0, 0.6).at_most(60.0), 0..=100;
         /// Additional thickness at the crest of a wrinkle, relative to the flat sheet. Rolled stretches of the rim have
         /// 0.4 to 1.6 times this thickness. Ridges narrower than 0.6 µm are thinner in proportion to their width.
@@ -332,7 +332,8 @@ section! {
         degeneration: Number (given f64) = 0.0, 0..=5;
         /// Amplitude of the irregularity of the outline.
         fray_um: Number = Number::log_normal(0.65, 0.45), 0..=5, "µm";
-        /// Width of the marginal zone in which the sheet becomes thinner.
+        /// Width of the marginal zone in which the sheet becomes thinner. The thickness increases exponentially with
+        /// the distance from the rim: at this distance, it is 86 % of that far from the rim.
         rim_um: Number (given f64) = Number::log_normal(2.2, 0.36), 0..=10, "µm";
         /// Gradient of the thickness of the sheet: standard deviation of the relative change over the radius of the
         /// cell.

@@ -26,7 +26,7 @@ const MOST_REACHES: f64 = 512.0;
 const RANGES: &[(&str, f64, f64)] = &[
     ("view.width", 1.0, 32_768.0), ("view.height", 1.0, 32_768.0), ("pixel_um", 0.04, 5.0),
     ("planes_um", -1e5, 1e5), ("first_um", -1e5, 1e5), ("step_um", 0.0, 1e4), ("planes", 1.0, 1e5),
-    ("noise_correlation", 0.0, 0.5), ("noise_skew", -0.1, 0.1),
+    ("noise_correlation", 0.0, 0.5), ("noise_skew", -0.1, 0.1), ("reduction", 1.0, 1.3), ("column_pattern", 0.0, 0.05),
     ("level", 1e-3, 2.0), ("exponent", 0.0, 10.0), ("falloff_x", 0.0, 1.0), ("falloff_y", 0.0, 1.0), ("illumination.centre", -10.0, 10.0),
     ("background.texture", 0.0, 1.0), ("texture_um", 0.1, 1e5),
     ("wavelength_um", 0.4, 0.7), ("bandwidth_um", 0.0, 0.1), ("lamp_k", 2000.0, 10_000.0), ("chromatic_um", -10.0, 10.0),

@@ -179,6 +179,8 @@ fn planes(recipe: &Recipe, field: &FieldNumbers) -> (Vec<f64>, Option<Fusion>) {
         planes: focus.planes as usize,
         noise_correlation: [focus.noise_correlation_x, focus.noise_correlation_y],
         noise_skew: focus.noise_correlation_diagonal,
+        reduction: focus.reduction,
+        column_pattern: focus.column_pattern,
     };
     (vec![focus.centre_um], Some(fusion))
 }

@@ -20,6 +20,17 @@ pub struct Fusion {
     pub noise_correlation: [f64; 2],
     /// Half the difference of the correlations of the noise along the diagonals: down right minus down left.
     pub noise_skew: f64,
+    /// Factor by which the image was reduced from the pixels of the sensor by linear interpolation.
+    #[serde(default = "one")]
+    pub reduction: f64,
+    /// Difference between the responses of even columns of the sensor and the mean, as a fraction of the mean, in the
+    /// last row.
+    #[serde(default)]
+    pub column_pattern: f64,
+}
+
+fn one() -> f64 {
+    1.0
 }
 
 impl Fusion {

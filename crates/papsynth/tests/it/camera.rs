@@ -3,8 +3,8 @@
 use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::{
-    Binning, Border, CameraPreset, Colour, Debris, Illumination, LightSection, Mixing, PhotonNoise, Preset, Recipe,
-    Rendition,
+    Binning, Border, CameraPreset, Colour, Debris, FocusOutput, Illumination, LightSection, Mixing, PhotonNoise,
+    Preset, Recipe, Rendition,
 };
 use papsynth::{Engine, Frame, Inputs};
 
@@ -93,6 +93,47 @@ fn saturated_pixels_are_reported_with_and_without_blooming() {
     }
     recipe.background.level = 0.5.into();
     assert!(frame(&recipe, 0).planes[0].saturated.is_empty());
+}
+
+#[test]
+fn planes_for_fusion_have_the_levels_and_noise_of_the_camera() {
+    for (bits, offset) in [(8.0, 0.0), (8.0, 20.0), (12.0, 100.0), (16.0, 0.0)] {
+        let mut recipe = empty();
+        recipe.background.level = 0.5.into();
+        (recipe.camera.bits, recipe.camera.offset_dn) = (bits.into(), offset.into());
+        let single = frame(&recipe, 0);
+        (recipe.focus.output, recipe.focus.planes) = (FocusOutput::Edf, 3.0.into());
+        let fused = frame(&recipe, 0);
+        let mean = |frame: &Frame| {
+            let levels = &frame.planes[0].noise_free;
+            levels.iter().map(|v| f64::from(*v)).sum::<f64>() / levels.len() as f64
+        };
+        // The offset of planes is that of the image times 2⁸ instead of 65 535/255.
+        assert!(
+            (mean(&fused) / mean(&single) - 1.0).abs() < 1e-3,
+            "{bits} {offset}: {} {}",
+            mean(&fused),
+            mean(&single)
+        );
+        let variance = |frame: &Frame| noise(frame).iter().map(|v| v * v).sum::<f64>() / noise(frame).len() as f64;
+        let ratio = variance(&fused) / variance(&single);
+        assert!((ratio - 1.0).abs() < 0.05, "{bits} {offset}: {ratio}");
+    }
+}
+
+#[test]
+fn saturated_pixels_of_edf_images_have_the_highest_level() {
+    let mut recipe = empty();
+    (recipe.focus.output, recipe.focus.planes) = (FocusOutput::Edf, 3.0.into());
+    for level in [0.5, 1.0] {
+        recipe.background.level = level.into();
+        let frame = frame(&recipe, 0);
+        let plane = &frame.planes[0];
+        let top = plane.grey.iter().filter(|grey| **grey == 255).count() as u64;
+        assert_eq!(plane.saturated.area(), top);
+        assert_eq!(top > 0, level == 1.0);
+        assert!(plane.noise_free.iter().all(|mean| *mean <= 255.0));
+    }
 }
 
 #[test]

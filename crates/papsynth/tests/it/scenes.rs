@@ -105,3 +105,14 @@ fn try_all(engine: &Engine, value: &mut Value, pointer: &str) -> usize {
     *value.pointer_mut(pointer).unwrap() = before;
     read
 }
+
+#[test]
+fn a_scene_without_the_reduction_of_edf_images_is_read_with_none() {
+    let scene = engine(Preset::ExtendedFocus).scene(Key { seed: 1, index: 0 }).unwrap();
+    let mut value = serde_json::to_value(&scene).unwrap();
+    let fusion = value["fusion"].as_object_mut().unwrap();
+    assert!(fusion.remove("reduction").is_some() && fusion.remove("column_pattern").is_some());
+    let read: Scene = serde_json::from_value(value).unwrap();
+    let found = read.fusion.unwrap();
+    assert_eq!((found.reduction, found.column_pattern), (1.0, 0.0));
+}

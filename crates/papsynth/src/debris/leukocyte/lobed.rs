@@ -92,7 +92,7 @@ const BORDER_UM: f64 = 0.5;
 const BORDER: [f64; 2] = [0.0, 0.7];
 /// Absorbance at the edge of a cytoplasm relative to its centre, from a sphere to a flat disc: minimum, maximum.
 /// Independent of that of the nucleus.
-const FLATNESS: [f64; 2] = [0.0, 0.9];
+const FLATNESS: [f64; 2] = [0.0, 0.6];
 
 /// Softness, µm: standard deviation of the blur of a leukocyte, minimum and maximum. Many leukocytes are about as high
 /// as wide, so that most of such a leukocyte is out of focus in every plane, and also in fused images. The range was

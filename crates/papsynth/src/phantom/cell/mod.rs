@@ -196,6 +196,10 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
     }
 
     let profile = &plan.class.class.cytoplasm.rim_to_centre;
+    let rim = body.detail.rim_um / body.radius_um;
+    let thinned = |depth: f64, thinning: fn(f64) -> f64| {
+        interpolate(profile, depth) * if rim > 0.0 { thinning(depth / rim) } else { 1.0 }
+    };
     let mut absorbance = coverage.blank();
     // A folded cell is thin at the rim of the sheet, part of which lies on the cell, but not along a crease.
     let folded = sheet.is_some() && !plan.creases.is_empty();
@@ -206,14 +210,15 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
             }
             let view =
                 PixelGrid { origin: [absorbance.origin[0] as f64, absorbance.origin[1] as f64], pixel_size: 1.0 };
-            let rim = if folded { body.detail.rim_um / body.radius_um } else { 0.0 };
+            let thinning = if folded { detail::thinning } else { detail::beyond_zone };
             sheet.thickness_into(&mut absorbance.values, coverage.width, &view, |radius| {
-                let thinning = if rim > 0.0 { detail::thinning((1.0 - radius) / rim) } else { 1.0 };
-                interpolate(profile, 1.0 - radius) * thinning
+                thinned(1.0 - radius, thinning)
             });
             ridges::limit_ridges(&mut absorbance, body.detail.ridges, pixel_um);
         }
-        None => flat(&mut absorbance, &coverage, profile, plan.centre, body.radius_um / pixel_um),
+        None => flat(&mut absorbance, &coverage, plan.centre, body.radius_um / pixel_um, |depth| {
+            thinned(depth, detail::beyond_zone)
+        }),
     }
     detail::apply_gradient(&mut absorbance, plan.centre, body.radius_um / pixel_um, body.detail.thickness_gradient);
     if !folded {
@@ -267,14 +272,14 @@ fn traits(body: &CellBody) -> Vec<Trait> {
     [fold, koilocytic, granular, pyknotic, wrinkled].into_iter().flatten().collect()
 }
 
-/// Computes the thickness of a sheet without folds from its profile from rim to centre.
-fn flat(absorbance: &mut Tile, coverage: &Tile, profile: &[f64], centre: Point, radius: f64) {
+/// Computes the thickness of a sheet without folds, a function of the distance from the rim in radii.
+fn flat(absorbance: &mut Tile, coverage: &Tile, centre: Point, radius: f64, thickness: impl Fn(f64) -> f64) {
     let cover = &coverage.values;
     let mut index = 0;
     absorbance.for_each(|p, value| {
         if cover[index] > 0.0 {
             let (dx, dy) = (p[0] - centre[0], p[1] - centre[1]);
-            *value = interpolate(profile, 1.0 - ((dx * dx + dy * dy).sqrt() / radius).min(1.0)) as f32;
+            *value = thickness(1.0 - ((dx * dx + dy * dy).sqrt() / radius).min(1.0)) as f32;
         }
         index += 1;
     });

@@ -47,13 +47,13 @@ const FORKED: f64 = 0.35;
 
 /// Fraction of the other wrinkles that are pleats, if they are not bundles: two dark lines with a paler band between,
 /// instead of ridges. This and the next two numbers were set by eye, beside cells of real fields.
-const PLEATS: f64 = 0.3;
+const PLEATS: f64 = 0.2;
 /// Width of a pleat relative to that of a ridge: minimum, maximum.
 const PLEAT_WIDTH: [f64; 2] = [0.8, 2.5];
 /// Fraction of wrinkles that are a bundle of fine ridges side by side, instead of one ridge or pleat: of those that
 /// follow the rim, and of others, rolled stretches of the rim included. These numbers and those of the next four
 /// constants were set by eye, beside cells of real fields.
-const BUNDLED: [f64; 2] = [0.25, 0.5];
+const BUNDLED: [f64; 2] = [0.2, 0.35];
 /// Number of ridges beside the first one of a bundle: minimum, and range above it.
 const BESIDE: [usize; 2] = [1, 3];
 /// Distance between the ridges of a bundle, µm: minimum, maximum.
@@ -61,7 +61,7 @@ const APART_UM: [f64; 2] = [0.9, 2.2];
 /// Width of these ridges (standard deviation of the profile), µm: minimum, maximum.
 const FINE_UM: [f64; 2] = [0.25, 0.5];
 /// Thickness of a ridge beside the first one, relative to it if both have the same width: minimum, maximum.
-const FAINTER: [f64; 2] = [0.4, 1.0];
+const FAINTER: [f64; 2] = [0.25, 0.9];
 
 /// Width of a wrinkle at its ends relative to its middle.
 const END_WIDTH: f64 = 0.4;
