@@ -671,10 +671,12 @@ class Dirt(Section):
     """Width of a fleck. From 0.1 to 10 µm."""
 
     aligned: Number | None = None
-    """Fraction of the flecks that are aligned with the direction of their cluster. From 0 to 1."""
+    """Fraction of the flecks that are aligned with the direction of their cluster. The clusters of a field have similar
+    directions. From 0 to 1.
+    """
 
     absorbance: Number | None = None
-    """Absorbance. From 0 to 4."""
+    """Absorbance, mean over the fleck. From 0 to 4."""
 
     phase_rad: Number | None = None
     """Phase delay; has an effect only with bright-field optics. From -3 to 3 radians of phase."""

@@ -17,10 +17,11 @@ section! {
         length_um: Number = Number::log_normal(2.1, 0.5), 0.1..=20, "µm";
         /// Width of a fleck.
         width_um: Number = Number::log_normal(1.1, 0.35), 0.1..=10, "µm";
-        /// Fraction of the flecks that are aligned with the direction of their cluster.
+        /// Fraction of the flecks that are aligned with the direction of their cluster. The clusters of a field have
+        /// similar directions.
         aligned: Number (undrawn) = 0.6, 0..=1;
-        /// Absorbance.
-        absorbance: Number = Number::log_normal(0.035, 0.5).at_least(0.01).at_most(0.2), 0..=4;
+        /// Absorbance, mean over the fleck.
+        absorbance: Number = Number::log_normal(0.028, 0.5).at_least(0.01).at_most(0.15), 0..=4;
         /// Phase delay; has an effect only with bright-field optics.
         phase_rad: Number = Number::uniform(0.0, 0.12), -3..=3, "radians of phase";
         /// Dyes.
@@ -95,9 +96,12 @@ impl Fleck {
         let mut canvas = context.canvas(joints.iter().map(|(at, _)| at), 0.5 * self.width_um);
         for (number, pair) in joints.windows(2).enumerate() {
             let [(from, first), (to, last)] = [pair[0], pair[1]];
-            let absorbance = self.absorbance * along((number as f64 + 0.5) / count as f64);
+            let absorbance = along((number as f64 + 0.5) / count as f64);
             canvas.stroke_max(&Stroke { ends: [from, to], half_widths: [first, last] }, absorbance);
         }
+        let drawn: f32 = canvas.absorbance.values.iter().sum();
+        let scale = self.absorbance as f32 * canvas.coverage.values.iter().sum::<f32>() / drawn.max(f32::MIN_POSITIVE);
+        canvas.absorbance.values.iter_mut().for_each(|value| *value *= scale);
         canvas.into_phantom(self.dyes, self.phase_rad, self.absorbance)
     }
 }

@@ -174,6 +174,20 @@ fn uniform_objects_have_the_specified_absorbance() {
 }
 
 #[test]
+fn flecks_of_dirt_have_similar_directions_in_a_field() {
+    let mut debris = Debris::none();
+    counted(&mut debris, ObjectKind::Dirt, 30.0);
+    debris.dirt.aligned = 1.0.into();
+    let scene = draw(&debris);
+    let flecks = scene.objects.iter().filter(|object| object.body.kind() == ObjectKind::Dirt);
+    let directions: Vec<f64> = flecks.map(|fleck| fleck.rotation_deg.to_radians()).collect();
+    let [x, y] = [libm::cos, libm::sin].map(|of| directions.iter().map(|angle| of(*angle)).sum::<f64>());
+    // Normal deviates of 33 degrees have a mean resultant length of 0.85.
+    let length = libm::hypot(x, y) / directions.len() as f64;
+    assert!(directions.len() > 50 && (0.7..0.97).contains(&length), "{} {length}", directions.len());
+}
+
+#[test]
 fn sizes_match_the_recipe() {
     let mut debris = Debris::none();
     counted(&mut debris, ObjectKind::RedCell, 4.0);
