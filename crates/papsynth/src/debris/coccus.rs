@@ -41,7 +41,7 @@ const CLUMP: usize = 9;
 const CLUMP_WIDTH: f64 = 0.28;
 
 /// Standard deviation of the angle from one coccus of a chain to the next, radians.
-const KINK: f64 = 0.45;
+const KINK: f64 = 0.22;
 
 /// Maximum distance of a coccus from the centre, in standard deviations.
 const MAX_DISTANCE: f64 = 4.0;
@@ -68,7 +68,12 @@ impl Colony {
             let (dx, dy) = (reach * libm::cos(*way), reach * libm::sin(*way));
             let stroke =
                 Stroke::even([at[0] - dx, at[1] - dy], [at[0] + dx, at[1] + dy], context.px(size * half_width));
-            canvas.stroke(&stroke, self.absorbance);
+            // Cocci of a chain touch; those of a clump lie on each other.
+            if self.chain {
+                canvas.stroke_max(&stroke, self.absorbance);
+            } else {
+                canvas.stroke(&stroke, self.absorbance);
+            }
         }
         canvas.into_phantom(context.dyes.bacillus, self.phase_rad, self.absorbance)
     }
@@ -82,10 +87,10 @@ impl Colony {
         let (mut at, mut way) = ([-0.5 * step * count as f64, 0.0], 0.0);
         (0..count)
             .map(|_| {
-                let here = at;
+                let (here, before) = (at, way);
                 way += KINK * random::normal(rng);
                 at = [at[0] + step * libm::cos(way), at[1] + step * libm::sin(way)];
-                (here, way)
+                (here, 0.5 * (before + way))
             })
             .collect()
     }
