@@ -13,7 +13,7 @@ use crate::distance::{Distance, Statistic, statistics};
 use crate::error::Error;
 use crate::hues::correct;
 use crate::measured::{Measured, measure_in};
-use crate::parameter::{Level, PARAMETERS, Parameter, Prior, Source, Values};
+use crate::parameter::{PARAMETERS, Parameter, Prior, Source, Values};
 use crate::posterior::{Knowledge, NEAR_SD, PRIOR_SD, Posterior, Response, Rows};
 use crate::recipe::{Setting, matched, recipe, simulated};
 use crate::sampler::{MakeEngine, Sampler};
@@ -290,7 +290,9 @@ impl Match {
         }
         let simulator = Simulator { setting: &setting, sampler: &sampler, make, seed: self.params.seed };
         let sought = simulated(&setting);
-        let mut search = Search { measured: &measured, real: &real, samples, known, sought, rows: Rows::default() };
+        let varies = sought.iter().map(|parameter| setting.varies(*parameter)).collect();
+        let rows = Rows::default();
+        let mut search = Search { measured: &measured, real: &real, samples, known, sought, varies, rows };
 
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(self.params.seed ^ 0x726f_756e_6473);
         let place = |p: &Parameter| p.prior().place(search.known.get(*p)).clamp(0.0, 1.0);
@@ -431,6 +433,8 @@ struct Search<'a> {
     /// Values of the initial recipe, and measured ones.
     known: Values,
     sought: Vec<Parameter>,
+    /// Which of these differ between fields.
+    varies: Vec<bool>,
     rows: Rows,
 }
 
@@ -505,10 +509,9 @@ impl Search<'_> {
 
     fn posterior(&self, start: &Posterior, prior: &[f64], phase: &Phase) -> Result<Posterior, Error> {
         let fields: Vec<Vec<f64>> = self.real.iter().map(|field| field.values.clone()).collect();
-        let varies: Vec<bool> = self.sought.iter().map(|p| p.prior().level == Level::Field).collect();
         let near: Vec<f64> =
             self.sought.iter().map(|p| if *p == Parameter::Pixel { PRIOR_SD } else { NEAR_SD }).collect();
-        let prior = Knowledge { means: prior, near: &near, varies: &varies };
+        let prior = Knowledge { means: prior, near: &near, varies: &self.varies };
         Ok(Response::new(&self.rows, phase)?.posterior(&fields, self.samples, start, &prior))
     }
 
@@ -526,7 +529,7 @@ impl Search<'_> {
                 let mut values = self.values(&found.fields[i], Some(i));
                 for (c, parameter) in self.sought.iter().enumerate() {
                     let prior = parameter.prior();
-                    if prior.level == Level::Field {
+                    if setting.varies(*parameter) {
                         values.set_spread(*parameter, prior.difference(found.difference_errors[c]));
                     } else {
                         values.set(*parameter, prior.value(found.means[c]));
@@ -542,7 +545,7 @@ impl Search<'_> {
             if !fitted(parameter) {
                 return fit;
             }
-            if prior.level == Level::Field {
+            if setting.varies(parameter) {
                 fit.fields = fields.iter().map(|values| values.get(parameter)).collect();
             }
             if let Some(c) = column(parameter) {

@@ -5,7 +5,7 @@ use papsynth::recipe::{
     Number, Optics, Preset, Quadratic, Recipe,
 };
 
-use crate::parameter::{PARAMETERS, Parameter as P, Source, Values};
+use crate::parameter::{Level, PARAMETERS, Parameter as P, Source, Values};
 
 /// Fixed properties of a matched recipe.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,6 +41,7 @@ impl Setting {
             P::NoiseCorrelationX | P::NoiseCorrelationY => self.extended,
             P::Pixel => self.seek_pixel,
             P::Size => !self.seek_pixel,
+            P::StrayLight => matches!(self.base.optics, Optics::BrightField(_)),
             P::Degeneration => centre(&self.base.cytoplasm.degeneration) > 0.0,
             P::Outside | P::ClusterRadius => matches!(self.base.layout, Layout::Clusters(_)),
             P::Superficial => PAIR.iter().all(|class| self.base.cells.contains_key(*class)),
@@ -50,6 +51,11 @@ impl Setting {
             }
             _ => true,
         }
+    }
+
+    /// Returns whether a parameter differs between fields. The blur of EDF images does not: all planes were in focus.
+    pub(crate) fn varies(&self, parameter: P) -> bool {
+        parameter.prior().level == Level::Field && !(self.extended && parameter == P::Blur)
     }
 
     /// Returns the values of the initial recipe.
@@ -77,6 +83,7 @@ impl Setting {
             _ => (30.0, 1.0),
         };
         let mut optics = base.optics.clone();
+        let stray_light = stray_light(&mut optics).map_or(0.0, |number| centre(number));
         let blur = blur(&mut optics);
         let debris = &base.debris;
         let mut values = Values::zero();
@@ -91,6 +98,7 @@ impl Setting {
             (P::Pixel, centre(&base.field.pixel_um)),
             (P::Photons, photons / (photons + read * read).max(1e-9)),
             (P::Blur, centre(blur)),
+            (P::StrayLight, stray_light),
             (P::Depth, centre(&base.slide.depth_um)),
             (P::FieldCytoplasm, centre(&base.stain.field_cytoplasm) * centre(&base.stain.slide_cytoplasm)),
             (P::FieldNucleus, centre(&base.stain.field_nucleus) * centre(&base.stain.slide_nucleus)),
@@ -169,6 +177,11 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
     camera(&mut r, sd(P::Noise), &on, &or_base);
     if on(P::Blur) {
         *blur(&mut r.optics) = cut(log_normal(get(P::Blur), sd(P::Blur)), 0.0, 10.0);
+    }
+    if on(P::StrayLight)
+        && let Some(fraction) = stray_light(&mut r.optics)
+    {
+        *fraction = number(get(P::StrayLight));
     }
     let stain = &mut r.stain;
     for (parameter, of_field, of_slide) in [
@@ -364,6 +377,14 @@ fn blur(optics: &mut Optics) -> &mut Number {
     match optics {
         Optics::BrightField(Microscope { extra_blur_um, .. }) => extra_blur_um,
         Optics::Gaussian(Gaussians { sigma_xy_um, .. }) => sigma_xy_um,
+    }
+}
+
+/// Returns the stray light of bright-field optics.
+fn stray_light(optics: &mut Optics) -> Option<&mut Number> {
+    match optics {
+        Optics::BrightField(Microscope { stray_light, .. }) => Some(stray_light),
+        Optics::Gaussian(_) => None,
     }
 }
 

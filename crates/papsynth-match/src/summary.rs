@@ -161,6 +161,7 @@ impl Summary {
         for a in TAILS {
             all.put(format!("fraction above {a}"), Transform::Log(0.002).of(tail(&s.histogram, a)));
         }
+        all.put("absorbance of the darkest parts", darkest(&s.histogram));
         for (i, noise) in (1..).zip(noise::noise_by_darkness(grey, width, empty)) {
             all.put(format!("noise in the dark, bin {i}"), noise);
         }
@@ -237,6 +238,23 @@ fn pairs(places: &[[f64; 2]], image: &FieldImage, within_px: f64) -> [f64; 2] {
     let n = places.len() as f64;
     let part = std::f64::consts::PI * within_px * within_px / image.grey.len() as f64;
     [found as f64, 0.5 * n * (n - 1.0) * part]
+}
+
+/// Fraction of the field that is darker than its darkest parts.
+const DARKEST: f64 = 0.0005;
+
+/// Returns the absorbance that this fraction of the histogram exceeds.
+fn darkest(histogram: &[f64]) -> f64 {
+    let mut darker = 0.0;
+    for (bin, part) in histogram.iter().enumerate().rev() {
+        darker += part;
+        if darker >= DARKEST {
+            // Inside the bin, from its upper border.
+            let bins = bin as f64 + (darker - DARKEST) / part;
+            return papsynth_judge::HISTOGRAM_FROM + papsynth_judge::HISTOGRAM_STEP * bins;
+        }
+    }
+    f64::NAN
 }
 
 /// Returns the fraction of the histogram above an absorbance.

@@ -6,7 +6,7 @@ section! {
     /// Colonies of cocci and coccobacilli.
     pub struct Cocci, drawn from rng as pub Colony {
         /// Number of colonies; drawn once per field.
-        colonies: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(6.4, 1.1)), 0..=100000, "per field or per mm²";
+        colonies: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(2.0, 1.1)), 0..=100000, "per field or per mm²";
         /// Cocci per colony.
         per_colony: Count (Count as cocci: "Number of cocci.") = Number::log_normal(30.0, 0.9).at_least(2.0), 1..=20000;
         /// Radius (standard deviation) of a colony that is not a chain.

@@ -6,7 +6,7 @@ section! {
     /// Strands of mucus: bundles of faint fibres.
     pub struct Mucus, drawn from rng as pub Strand {
         /// Number of strands; drawn once per field.
-        strands: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(2.4, 0.8)), 0..=10000, "per field or per mm²";
+        strands: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(1.0, 0.8)), 0..=10000, "per field or per mm²";
         /// Fraction of the strands that are on a cell.
         on_cells: Number (undrawn) = 0.3, 0..=1;
         /// Length of a strand.

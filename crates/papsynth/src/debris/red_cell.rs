@@ -6,7 +6,7 @@ section! {
     /// Red blood cells, in clusters.
     pub struct RedCells, drawn from rng as pub RedCell {
         /// Number of clusters; drawn once per field.
-        clusters: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(1.5, 0.9)), 0..=100000, "per field or per mm²";
+        clusters: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(0.5, 0.9)), 0..=100000, "per field or per mm²";
         /// Red cells per cluster.
         per_cluster: Count (undrawn) = Number::log_normal(4.0, 0.9).at_least(1.0), 1..=10000;
         /// Radius (standard deviation) of a cluster.

@@ -77,8 +77,8 @@ impl Preset {
 }
 
 impl Recipe {
-    /// Returns the same slide as an EDF image of a scanner: with the focus, blur, softness of edges, noise, texture and
-    /// staining strength of [`Preset::ExtendedFocus`], and no objects out of focus.
+    /// Returns the same slide as an EDF image of a scanner: with the focus, blur, stray light, softness of edges,
+    /// noise, texture and staining strength of [`Preset::ExtendedFocus`], and no objects out of focus.
     ///
     /// The reduction and the pattern of columns are those of one camera; for another one, set them to 1 and 0.
     #[must_use]
@@ -87,6 +87,7 @@ impl Recipe {
         self.focus = Focus { centre_um: self.focus.centre_um, ..like.focus };
         if let (Optics::BrightField(own), Optics::BrightField(like)) = (&mut self.optics, like.optics) {
             own.extra_blur_um = like.extra_blur_um;
+            own.stray_light = like.stray_light;
         }
         macro_rules! take {
             ($($section:ident.$number:ident),*) => {

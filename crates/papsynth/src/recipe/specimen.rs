@@ -272,7 +272,7 @@ section! {
         /// Model of the cytoplasm as a sheet.
         sheet: Sheet (undrawn) = Sheet::Xpbd;
         /// Area of the flat sheet, relative to the area of the cell. Larger values give more wrinkles.
-        excess_area: Number (given f64) = Number::uniform(1.04, 1.16), 1..=2;
+        excess_area: Number (given f64) = Number::uniform(1.0, 1.06), 1..=2;
         /// Folds of the cytoplasm.
         folds: Folds (undrawn);
         /// Angularity of the outline: 0 is smooth, 1 a polygon.
@@ -289,17 +289,17 @@ section! {
         ridges: Number (given f64) = 0.25, 0..=100;
         /// Number of wrinkles: ridges, pleats and bundles of fine ridges. An eighth of them are rolled stretches of the
         /// rim. A quarter to a third are bundles, whose ridges have a width of 0.25 to 0.5 µm.
-        wrinkles: Number (given usize) = Number::log_normal(15.0, 0.6).at_most(60.0), 0..=100;
+        wrinkles: Number (given usize) = Number::log_normal(20.0, 0.6).at_most(80.0), 0..=100;
         /// Additional thickness at the crest of a wrinkle, relative to the flat sheet. Rolled stretches of the rim have
         /// 0.4 to 1.6 times this thickness. Ridges narrower than 0.6 µm are thinner in proportion to their width.
         wrinkle_thickness: Number (given f64) = Number::log_normal(0.34, 0.6).at_most(1.3), 0..=5;
         /// Width of a wrinkle: standard deviation of its profile. Rolled stretches of the rim have 0.4 to 0.9 µm.
-        wrinkle_um: Number (given f64) = Number::uniform(0.3, 1.3), 0.05..=5, "µm";
+        wrinkle_um: Number (given f64) = Number::uniform(0.25, 0.8), 0.05..=5, "µm";
         /// Additional thickness of the inner cytoplasm, relative to the rest: 1.4 times this number.
         endoplasm: Number (given f64) = Number::log_normal(0.4, 0.5).at_most(1.5), 0..=2;
         /// Amplitude of the first level of detail, low-frequency noise, relative to the absorbance of the cytoplasm.
         /// Dark places are smaller and stronger than pale ones.
-        clouds: Number = Number::uniform(0.045, 0.17), 0..=2;
+        clouds: Number = Number::uniform(0.035, 0.13), 0..=2;
         /// Standard deviation of the smoothing of that noise: two noise fields with 1.2 and 0.6 times this number, each
         /// stretched in a direction of its own.
         clouds_um: Number = Number::log_normal(4.0, 0.7).at_least(0.7).at_most(14.0), 0.1..=100, "µm";
@@ -318,7 +318,7 @@ section! {
             (given [f64; 2] as texture: "Standard deviation of the fine texture of the outer and of the inner cytoplasm, relative to their absorbance.")
             = 0.62, 0..=20;
         /// Factor on the sizes of the fine texture of the cytoplasm. Its strength stays the same.
-        texture_size: Number (given f64) = Number::log_normal(1.0, 0.2).at_least(0.4).at_most(2.5), 0.2..=5;
+        texture_size: Number (given f64) = Number::log_normal(0.94, 0.2).at_least(0.4).at_most(2.5), 0.2..=5;
         /// Probability that a cell is granular.
         granular: Number (undrawn) = 0.14, 0..=1;
         /// Number of granules of a granular cell per 100 µm².

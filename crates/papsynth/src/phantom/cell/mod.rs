@@ -40,6 +40,10 @@ const WAVES: [[f64; 3]; 2] = [[1.0, 0.8, 1.8], [0.3, 0.3, 0.6]];
 /// Distance between the points of a roughened rim, µm.
 const RIM_STEP_UM: f64 = 0.375;
 
+/// Width of the zone in which the edge of a fold, or of a wrinkle at the rim, becomes thinner, as `rim_um`. In EDF
+/// images of Cervix93, the steepest edges are those of nuclei, and folded edges of cells are softer.
+const EDGE_UM: f64 = 2.0;
+
 /// Draws cells; sheets are simulated in batches.
 pub(super) fn make(assets: &PhantomAssets, cells: &[CellContext<'_>]) -> Result<Vec<Phantom>, ErrorKind> {
     let plans = cells.iter().map(CellPlan::new).collect::<Result<Vec<_>, _>>()?;
@@ -221,12 +225,16 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
         }),
     }
     detail::apply_gradient(&mut absorbance, plan.centre, body.radius_um / pixel_um, body.detail.thickness_gradient);
-    if !folded {
+    let mut edge = Tile { values: vec![1.0; coverage.values.len()], ..coverage.blank() };
+    detail::thin_rim(&mut edge, &coverage, EDGE_UM / pixel_um);
+    if folded {
+        absorbance.values.iter_mut().zip(&edge.values).for_each(|(value, edge)| *value *= edge);
+    } else {
         detail::thin_rim(&mut absorbance, &coverage, body.detail.rim_um / pixel_um);
     }
     let nucleus = [0, 1].map(|axis| plan.centre[axis] + body.nucleus.off_centre[axis] * body.radius_um / pixel_um);
     let mut canvas = vec![0.0; absorbance.values.len() + wrinkles::LANES];
-    wrinkles.add(&mut absorbance, &coverage, &mut canvas);
+    wrinkles.add(&mut absorbance, &edge, &mut canvas);
     let inner = detail::add_endoplasm(&mut absorbance, &plan.outline, nucleus, cell);
     halo::add_halo(&mut absorbance, nucleus, cell);
     detail::add_detail(&mut absorbance, &coverage, inner, cell, &mut rng)?;

@@ -22,7 +22,7 @@ const ROLLED_THICKNESS: [f64; 2] = [0.4, 1.6];
 /// Width of a rolled stretch (standard deviation of its profile), µm: minimum, maximum.
 const ROLLED_UM: [f64; 2] = [0.4, 0.9];
 /// Distance of a rolled stretch from the rim, in radii of the cell: minimum, maximum.
-const ROLLED_INSET: [f64; 2] = [0.01, 0.04];
+const ROLLED_INSET: [f64; 2] = [0.015, 0.08];
 
 /// Thickness of the ridge along the edge of a flap relative to that of a wrinkle, and its width, µm: minimum, maximum.
 const EDGE_THICKNESS: [f64; 2] = [0.4, 2.0];
