@@ -134,8 +134,8 @@ fn exit_error(error: &Error, real: &std::path::Path) -> ExitError {
 
 fn summary(fit: &Fit) -> String {
     let extended = if fit.extended {
-        "the fields are fused from several focal planes: focus, noise and softness of edges begin with those of the \
-         preset extended-focus\n"
+        "the fields are fused from several focal planes: focus, blur, stray light, noise and softness of edges \
+         begin with those of the preset extended-focus\n"
     } else {
         ""
     };

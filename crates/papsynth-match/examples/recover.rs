@@ -47,7 +47,9 @@ fn trial(fields: usize, seed: u64) -> Result<(Vec<FieldImage>, Vec<f64>), Box<dy
     let middle: Vec<[f64; 2]> = PARAMETERS
         .iter()
         .map(|p| {
-            let apart = if p.prior().level == Level::Field { MOST_APART * uniform(&mut rng) } else { 0.0 };
+            // The fields of EDF images share the blur.
+            let varies = p.prior().level == Level::Field && *p != Parameter::Blur;
+            let apart = if varies { MOST_APART * uniform(&mut rng) } else { 0.0 };
             [0.05 + 0.9 * uniform(&mut rng), apart]
         })
         .collect();

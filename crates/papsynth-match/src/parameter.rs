@@ -102,7 +102,7 @@ parameters! {
     Pixel: Simulated, All, Logarithmic 0.15..0.75 "um", "field.pixel_um";
     /// Fraction of photon noise in the noise variance of the empty slide, without the fixed pattern.
     Photons: Simulated, All, Linear 0.05..0.95 "", "camera.full_well_e, camera.read_noise_e: part of photons";
-    /// Blur beyond diffraction.
+    /// Blur beyond diffraction. The fields of EDF images share one value.
     Blur: Simulated, Field, Logarithmic 0.08..0.9 "um", "optics.extra_blur_um";
     /// Stray light over the light of the empty slide.
     StrayLight: Simulated, All, Linear 0.0..0.2 "", "optics.stray_light";

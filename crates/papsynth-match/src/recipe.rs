@@ -53,7 +53,8 @@ impl Setting {
         }
     }
 
-    /// Returns whether a parameter differs between fields. The blur of EDF images does not: all planes were in focus.
+    /// Returns whether a parameter differs between fields. The blur of EDF images does not: each part comes from the
+    /// plane in which it is sharpest.
     pub(crate) fn varies(&self, parameter: P) -> bool {
         parameter.prior().level == Level::Field && !(self.extended && parameter == P::Blur)
     }
@@ -510,6 +511,16 @@ mod tests {
                 assert!(problems.is_empty(), "{preset:?}, {parameter:?}: {problems:?}");
             }
         }
+    }
+
+    #[test]
+    fn stray_light_is_sought_in_bright_field_optics_only() {
+        let mut setting = setting(true);
+        assert!(setting.seeks(P::StrayLight));
+        let values = Values::at(&[0.5; PARAMETERS.len()]);
+        setting.base.optics = Optics::Gaussian(Gaussians::default());
+        assert!(!setting.seeks(P::StrayLight));
+        assert!(matches!(recipe(&setting, &values, |_| true).optics, Optics::Gaussian(_)));
     }
 
     #[test]

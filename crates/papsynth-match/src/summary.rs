@@ -240,16 +240,16 @@ fn pairs(places: &[[f64; 2]], image: &FieldImage, within_px: f64) -> [f64; 2] {
     [found as f64, 0.5 * n * (n - 1.0) * part]
 }
 
-/// Fraction of the field that is darker than its darkest parts.
+/// Fraction of the field that its darkest parts cover.
 const DARKEST: f64 = 0.0005;
 
-/// Returns the absorbance that this fraction of the histogram exceeds.
+/// Returns the absorbance that the darkest parts of a field exceed, at most that of the last bin of the histogram.
 fn darkest(histogram: &[f64]) -> f64 {
     let mut darker = 0.0;
     for (bin, part) in histogram.iter().enumerate().rev() {
         darker += part;
         if darker >= DARKEST {
-            // Inside the bin, from its upper border.
+            // The darkest pixels of the bin belong to the darkest parts.
             let bins = bin as f64 + (darker - DARKEST) / part;
             return papsynth_judge::HISTOGRAM_FROM + papsynth_judge::HISTOGRAM_STEP * bins;
         }
@@ -261,4 +261,21 @@ fn darkest(histogram: &[f64]) -> f64 {
 fn tail(histogram: &[f64], above: f64) -> f64 {
     let from = whole((above - papsynth_judge::HISTOGRAM_FROM) / papsynth_judge::HISTOGRAM_STEP + 0.5);
     histogram.iter().skip(from).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_darkest_parts_are_the_upper_end_of_the_histogram() {
+        let mut histogram = vec![0.0; 60];
+        (histogram[0], histogram[20], histogram[30]) = (0.9, 0.0999, 0.0001);
+        // 0.0004 of the 0.0999 in bin 20.
+        let wanted = -0.05 + 0.02 * (21.0 - 0.0004 / 0.0999);
+        assert!((darkest(&histogram) - wanted).abs() < 1e-9);
+        (histogram[0], histogram[59]) = (0.0, 0.9);
+        assert!((1.149..1.15).contains(&darkest(&histogram)));
+        assert!(darkest(&[f64::NAN; 60]).is_nan() && darkest(&[]).is_nan());
+    }
 }

@@ -2,10 +2,11 @@
 //!
 //! Real EDF images were reduced from a sensor with smaller pixels by linear interpolation: this correlates the noise
 //! and lets its variance change periodically along rows and columns. Most of the noise is a fixed pattern of the
-//! camera, which is equal in all planes and so remains everywhere. The rest is averaged on the empty slide. In
-//! structured regions the sharpest plane changes every few pixels: the rest is stronger and uncorrelated, and short
-//! lines along rows and columns appear, as fusion by wavelets produces them (Forster et al. 2004,
-//! doi:10.1002/jemt.20092). Correlations, the period and lines were measured on real EDF images.
+//! camera, which is equal in all planes and so remains everywhere, less so in the dark. The rest is averaged on the
+//! empty slide. In the dark and in structured regions, where the sharpest plane changes every few pixels, the rest is
+//! stronger and uncorrelated; on structure, short lines along rows and columns appear, as fusion by wavelets produces
+//! them (Forster et al. 2004, doi:10.1002/jemt.20092). Correlations, the period and lines were measured on real EDF
+//! images.
 
 use multiversion::multiversion;
 
@@ -17,8 +18,8 @@ mod wavelet;
 
 /// Gives the noise, the difference between grey levels and expected grey levels, the properties of EDF images.
 ///
-/// The variance of the noise is unchanged, except just below the highest grey level, where the mean is lower too, and
-/// on structure, apart from the pattern of columns. `input_top` is the grey level of the planes that becomes the
+/// The variance of the noise is unchanged, except just below the highest grey level, where the mean is lower too, on
+/// structure, and in the dark, apart from the pattern of columns. `input_top` is the grey level of the planes that becomes the
 /// highest one of the image, `top`.
 pub(crate) fn correlate(
     grey: &mut [u16],
@@ -53,6 +54,7 @@ pub(crate) fn correlate(
     // Near the highest grey level, planes are clipped before fusion.
     let of_plane = ((PLANE_NOISE * PLANE_NOISE - 1.0) * variance).sqrt().max(1e-6) as f32;
     let clipped = clipped_table();
+    let bright = BRIGHT * expected.iter().copied().fold(f32::MIN_POSITIVE, f32::max).min(top);
     let height = grey.len() / row;
     for (y, grey) in grey.chunks_exact_mut(row).enumerate() {
         let read_out = (y as f32 + 0.5) / height as f32;
@@ -60,7 +62,7 @@ pub(crate) fn correlate(
             let at = y * row + i;
             let structured = structure[at] / (structure[at] + half).max(f32::MIN_POSITIVE);
             let sharp = structure[at] / (structure[at] + variance as f32).max(f32::MIN_POSITIVE);
-            let dark = ((BRIGHT - expected[at] / top) / BRIGHT).clamp(0.0, 1.0);
+            let dark = (1.0 - expected[at] / bright).clamp(0.0, 1.0);
             let correlated = 1.0 - ((1.0 - FIXED) * structured).max(DARK * dark);
             let uncorrelated = (1.0 - correlated * correlated + GAIN * sharp + DARK_GAIN * dark).sqrt();
             let noise = uncorrelated * own[at] + correlated * shared[at] + LINES * structured * lines[at];
@@ -186,16 +188,19 @@ const FIXED: f32 = 0.87;
 /// reached: fitted to the noise on cytoplasm and nuclei of real EDF images.
 const HALF_UNCORRELATED: f64 = 80.0;
 
-/// Grey level, relative to the highest one, below which noise is less correlated.
+/// Grey level, relative to the brightest place, below which noise is less correlated and stronger.
 const BRIGHT: f32 = 0.6;
 
 /// Increase of the variance of noise where a plane is sharper than others, relative to the empty slide, where several
 /// planes are averaged: fitted, with [`LINES`], to the spectra of 24 real EDF images in cells.
 const GAIN: f32 = 0.14;
 
-/// Decrease of this weight, and increase of the variance, in the dark: fitted to the correlation of neighbours and to
-/// the finest detail in nuclei of real EDF images.
+/// Decrease of the weight of the correlated noise in the dark: fitted to the correlation of neighbours in nuclei of
+/// real EDF images.
 const DARK: f32 = 0.5;
+
+/// Increase of the variance of noise in the dark, relative to the empty slide: fitted to the finest detail in nuclei of
+/// real EDF images.
 const DARK_GAIN: f32 = 0.4;
 
 /// Amplitude of the lines along rows and columns in structured regions, relative to the noise filtered to such lines.
@@ -457,13 +462,18 @@ mod tests {
 
     #[test]
     fn noise_in_dark_areas_is_less_correlated_and_stronger() {
-        let (noise, variance) = fused(|_| 800.0, 30.0, 0.02, [16_383.0; 2]);
-        let dark = 1.0 - 800.0 / (16_383.0 * f64::from(BRIGHT));
+        const BRIGHT_ROWS: usize = 20;
+        let level = |i: usize| if i < BRIGHT_ROWS * WIDTH { 12_000.0 } else { 1200.0 };
+        let (noise, _) = fused(level, 30.0, 0.02, [16_383.0; 2]);
+        // Far from the structure at the border of the bright rows.
+        let noise = &noise[(BRIGHT_ROWS + 10) * WIDTH..];
+        let variance = product(noise, 0);
+        let dark = 1.0 - 0.1 / f64::from(BRIGHT);
         let stronger = 1.0 + f64::from(DARK_GAIN) * dark;
         assert!((variance / (900.0 * stronger) - 1.0).abs() < 0.03, "{variance}");
         let correlated = 1.0 - f64::from(DARK) * dark;
         let part = correlated * correlated / stronger;
-        let [across, down] = [1, WIDTH].map(|step| product(&noise, step) / variance);
+        let [across, down] = [1, WIDTH].map(|step| product(noise, step) / variance);
         assert!((across - 0.2 * part).abs() < 0.015 && (down - 0.4 * part).abs() < 0.015, "{across} {down}, {part}");
     }
 

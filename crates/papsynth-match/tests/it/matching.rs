@@ -215,6 +215,7 @@ fn invalid_fields_and_parameters_are_errors_and_the_stop_flag_ends_a_match() {
 fn the_stains_of_colour_fields_are_matched() {
     let mut base = Preset::Lbc.recipe();
     base.light = LightSection::Colour(Colour::default());
+    // Far from the default, as a few small fields determine the hue of nuclei to about 0.1.
     (base.stain.nucleus.eosin_y, base.stain.cyanophilic.eosin_y) = (1.2, 1.0);
     let images = fields_of(&setting_of(base, [420, 320]), 4, NucleiFrom::Masks, 0.0);
     let fit = on_threads(2, &images, &small(PixelSize::Known(PIXEL_UM), 0));

@@ -134,6 +134,11 @@ mod tests {
             (&fused.nucleus.edge_um, &fused.stain.field_texture),
             (&like.nucleus.edge_um, &like.stain.field_texture)
         );
+        let light = |recipe: &Recipe| match &recipe.optics {
+            Optics::BrightField(microscope) => Some((microscope.extra_blur_um.clone(), microscope.stray_light.clone())),
+            Optics::Gaussian(_) => None,
+        };
+        assert!(light(&fused).is_some() && light(&fused) == light(&like));
         assert_eq!(fused.debris.out_of_focus.count, like.debris.out_of_focus.count);
         assert_eq!((&fused.cells, &fused.debris.leukocytes), (&own.cells, &own.debris.leukocytes));
     }

@@ -99,7 +99,7 @@ fn saturated_pixels_are_reported_with_and_without_blooming() {
 fn planes_for_fusion_have_the_levels_and_noise_of_the_camera() {
     for (bits, offset) in [(8.0, 0.0), (8.0, 20.0), (12.0, 100.0), (16.0, 0.0)] {
         let mut recipe = empty();
-        recipe.background.level = 0.7.into();
+        recipe.background.level = 0.5.into();
         (recipe.camera.bits, recipe.camera.offset_dn) = (bits.into(), offset.into());
         let single = frame(&recipe, 0);
         (recipe.focus.output, recipe.focus.planes) = (FocusOutput::Edf, 3.0.into());

@@ -40,9 +40,9 @@ const WAVES: [[f64; 3]; 2] = [[1.0, 0.8, 1.8], [0.3, 0.3, 0.6]];
 /// Distance between the points of a roughened rim, µm.
 const RIM_STEP_UM: f64 = 0.375;
 
-/// Width of the zone in which the edge of a fold, or of a wrinkle at the rim, becomes thinner, as `rim_um`. In EDF
-/// images of Cervix93, the steepest edges are those of nuclei, and folded edges of cells are softer.
-const EDGE_UM: f64 = 2.0;
+/// Largest width of the zone in which a folded cell becomes thinner towards its edge, µm. In EDF images of Cervix93,
+/// the steepest edges are those of nuclei, and folded edges of cells are softer.
+const FOLD_EDGE_UM: f64 = 2.0;
 
 /// Draws cells; sheets are simulated in batches.
 pub(super) fn make(assets: &PhantomAssets, cells: &[CellContext<'_>]) -> Result<Vec<Phantom>, ErrorKind> {
@@ -205,7 +205,8 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
         interpolate(profile, depth) * if rim > 0.0 { thinning(depth / rim) } else { 1.0 }
     };
     let mut absorbance = coverage.blank();
-    // A folded cell is thin at the rim of the sheet, part of which lies on the cell, but not along a crease.
+    // A folded cell is thin at the rim of the sheet, part of which lies on the cell. Its edge, with the creases, is
+    // soft in a narrower zone.
     let folded = sheet.is_some() && !plan.creases.is_empty();
     match sheet {
         Some(mut sheet) => {
@@ -225,16 +226,11 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
         }),
     }
     detail::apply_gradient(&mut absorbance, plan.centre, body.radius_um / pixel_um, body.detail.thickness_gradient);
-    let mut edge = Tile { values: vec![1.0; coverage.values.len()], ..coverage.blank() };
-    detail::thin_rim(&mut edge, &coverage, EDGE_UM / pixel_um);
-    if folded {
-        absorbance.values.iter_mut().zip(&edge.values).for_each(|(value, edge)| *value *= edge);
-    } else {
-        detail::thin_rim(&mut absorbance, &coverage, body.detail.rim_um / pixel_um);
-    }
+    let rim_um = if folded { body.detail.rim_um.min(FOLD_EDGE_UM) } else { body.detail.rim_um };
+    detail::thin_rim(&mut absorbance, &coverage, rim_um / pixel_um);
     let nucleus = [0, 1].map(|axis| plan.centre[axis] + body.nucleus.off_centre[axis] * body.radius_um / pixel_um);
     let mut canvas = vec![0.0; absorbance.values.len() + wrinkles::LANES];
-    wrinkles.add(&mut absorbance, &edge, &mut canvas);
+    wrinkles.add(&mut absorbance, &coverage, &mut canvas);
     let inner = detail::add_endoplasm(&mut absorbance, &plan.outline, nucleus, cell);
     halo::add_halo(&mut absorbance, nucleus, cell);
     detail::add_detail(&mut absorbance, &coverage, inner, cell, &mut rng)?;
