@@ -19,8 +19,8 @@ mod wavelet;
 /// Gives the noise, the difference between grey levels and expected grey levels, the properties of EDF images.
 ///
 /// The variance of the noise is unchanged, except just below the highest grey level, where the mean is lower too, on
-/// structure, and in the dark, apart from the pattern of columns. `input_top` is the grey level of the planes that becomes the
-/// highest one of the image, `top`.
+/// structure, and in the dark, apart from the pattern of columns. `input_top` is the grey level of the planes that
+/// becomes the highest one of the image, `top`.
 pub(crate) fn correlate(
     grey: &mut [u16],
     expected: &mut [f32],
