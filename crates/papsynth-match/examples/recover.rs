@@ -15,7 +15,7 @@ use papsynth::model::Model;
 use papsynth::recipe::{Preset, Recipe};
 use papsynth::{Engine, Inputs};
 use papsynth_judge::{Control, Detail, FieldImage, NucleiFrom};
-use papsynth_match::{Level, Match, MatchParams, Origin, PARAMETERS, Sampler, Setting, Values, recipe};
+use papsynth_match::{Level, Match, MatchParams, Origin, PARAMETERS, Parameter, Sampler, Setting, Values, recipe};
 use portable_numerics::random::{normal, uniform};
 use portable_numerics::statistics::quantile;
 use rand_core::SeedableRng;
