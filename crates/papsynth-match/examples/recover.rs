@@ -15,7 +15,7 @@ use papsynth::model::Model;
 use papsynth::recipe::{Preset, Recipe};
 use papsynth::{Engine, Inputs};
 use papsynth_judge::{Control, Detail, FieldImage, NucleiFrom};
-use papsynth_match::{Level, Match, MatchParams, Origin, PARAMETERS, Parameter, Sampler, Setting, Values, recipe};
+use papsynth_match::{Match, MatchParams, Origin, PARAMETERS, Sampler, Setting, Values, recipe};
 use portable_numerics::random::{normal, uniform};
 use portable_numerics::statistics::quantile;
 use rand_core::SeedableRng;
@@ -47,9 +47,7 @@ fn trial(fields: usize, seed: u64) -> Result<(Vec<FieldImage>, Vec<f64>), Box<dy
     let middle: Vec<[f64; 2]> = PARAMETERS
         .iter()
         .map(|p| {
-            // The fields of EDF images share the blur.
-            let varies = p.prior().level == Level::Field && *p != Parameter::Blur;
-            let apart = if varies { MOST_APART * uniform(&mut rng) } else { 0.0 };
+            let apart = if setting.varies(*p) { MOST_APART * uniform(&mut rng) } else { 0.0 };
             [0.05 + 0.9 * uniform(&mut rng), apart]
         })
         .collect();

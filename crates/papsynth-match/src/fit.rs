@@ -290,9 +290,7 @@ impl Match {
         }
         let simulator = Simulator { setting: &setting, sampler: &sampler, make, seed: self.params.seed };
         let sought = simulated(&setting);
-        let varies = sought.iter().map(|parameter| setting.varies(*parameter)).collect();
-        let rows = Rows::default();
-        let mut search = Search { measured: &measured, real: &real, samples, known, sought, varies, rows };
+        let mut search = Search { measured: &measured, real: &real, samples, known, sought, rows: Rows::default() };
 
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(self.params.seed ^ 0x726f_756e_6473);
         let place = |p: &Parameter| p.prior().place(search.known.get(*p)).clamp(0.0, 1.0);
@@ -308,7 +306,7 @@ impl Match {
                 }
             };
             search.simulate(&simulator, draws, done, &phase)?;
-            posterior = search.posterior(&posterior, &prior, &phase)?;
+            posterior = search.posterior(&setting, &posterior, &prior, &phase)?;
             done = phase.done();
         }
 
@@ -433,8 +431,6 @@ struct Search<'a> {
     /// Values of the initial recipe, and measured ones.
     known: Values,
     sought: Vec<Parameter>,
-    /// Which of these differ between fields.
-    varies: Vec<bool>,
     rows: Rows,
 }
 
@@ -507,11 +503,18 @@ impl Search<'_> {
         Ok(())
     }
 
-    fn posterior(&self, start: &Posterior, prior: &[f64], phase: &Phase) -> Result<Posterior, Error> {
+    fn posterior(
+        &self,
+        setting: &Setting,
+        start: &Posterior,
+        prior: &[f64],
+        phase: &Phase,
+    ) -> Result<Posterior, Error> {
         let fields: Vec<Vec<f64>> = self.real.iter().map(|field| field.values.clone()).collect();
+        let varies: Vec<bool> = self.sought.iter().map(|parameter| setting.varies(*parameter)).collect();
         let near: Vec<f64> =
             self.sought.iter().map(|p| if *p == Parameter::Pixel { PRIOR_SD } else { NEAR_SD }).collect();
-        let prior = Knowledge { means: prior, near: &near, varies: &self.varies };
+        let prior = Knowledge { means: prior, near: &near, varies: &varies };
         Ok(Response::new(&self.rows, phase)?.posterior(&fields, self.samples, start, &prior))
     }
 

@@ -55,7 +55,8 @@ impl Setting {
 
     /// Returns whether a parameter differs between fields. The blur of EDF images does not: each part comes from the
     /// plane in which it is sharpest.
-    pub(crate) fn varies(&self, parameter: P) -> bool {
+    #[must_use]
+    pub fn varies(&self, parameter: P) -> bool {
         parameter.prior().level == Level::Field && !(self.extended && parameter == P::Blur)
     }
 

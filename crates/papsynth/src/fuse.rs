@@ -180,8 +180,8 @@ fn equalise(values: &mut [f32]) {
     }
 }
 
-/// Weight of the correlated noise on structure, where only the fixed pattern of the camera is
-/// correlated: measured on 24 real EDF images of one camera, whose fixed pattern is the mean of their empty areas.
+/// Weight of the correlated noise on structure, where only the fixed pattern of the camera is correlated: measured on
+/// 24 real EDF images of one camera, whose fixed pattern is the mean of their empty areas.
 const FIXED: f32 = 0.87;
 
 /// Variance of structure, relative to that of noise, at which half of the change from the empty slide to structure is
