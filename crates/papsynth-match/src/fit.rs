@@ -14,7 +14,7 @@ use crate::error::Error;
 use crate::hues::correct;
 use crate::measured::{Measured, measure_in};
 use crate::parameter::{PARAMETERS, Parameter, Prior, Source, Values};
-use crate::posterior::{Knowledge, NEAR_SD, PRIOR_SD, Posterior, Response, Rows};
+use crate::posterior::{FUSED_SD, Knowledge, NEAR_SD, PRIOR_SD, Posterior, Response, Rows};
 use crate::recipe::{Setting, matched, recipe, simulated};
 use crate::sampler::{MakeEngine, Sampler};
 use crate::simulate::{Simulator, latin, samples_of};
@@ -512,8 +512,12 @@ impl Search<'_> {
     ) -> Result<Posterior, Error> {
         let fields: Vec<Vec<f64>> = self.real.iter().map(|field| field.values.clone()).collect();
         let varies: Vec<bool> = self.sought.iter().map(|parameter| setting.varies(*parameter)).collect();
-        let near: Vec<f64> =
-            self.sought.iter().map(|p| if *p == Parameter::Pixel { PRIOR_SD } else { NEAR_SD }).collect();
+        let near = |parameter: &Parameter| match parameter {
+            Parameter::Pixel => PRIOR_SD,
+            Parameter::Blur if setting.extended => FUSED_SD,
+            _ => NEAR_SD,
+        };
+        let near: Vec<f64> = self.sought.iter().map(near).collect();
         let prior = Knowledge { means: prior, near: &near, varies: &varies };
         Ok(Response::new(&self.rows, phase)?.posterior(&fields, self.samples, start, &prior))
     }

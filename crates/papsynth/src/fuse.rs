@@ -3,10 +3,10 @@
 //! Real EDF images were reduced from a sensor with smaller pixels by linear interpolation: this correlates the noise
 //! and lets its variance change periodically along rows and columns. Most of the noise is a fixed pattern of the
 //! camera, which is equal in all planes and so remains everywhere, less so in the dark. The rest is averaged on the
-//! empty slide. In the dark and in structured regions, where the sharpest plane changes every few pixels, the rest is
-//! stronger and uncorrelated; on structure, short lines along rows and columns appear, as fusion by wavelets produces
-//! them (Forster et al. 2004, doi:10.1002/jemt.20092). Correlations, the period and lines were measured on real EDF
-//! images.
+//! empty slide, where a tenth of the variance is uncorrelated. In the dark and in structured regions, where the
+//! sharpest plane changes every few pixels, the rest is stronger and uncorrelated; on structure, short lines along rows
+//! and columns appear, as fusion by wavelets produces them (Forster et al. 2004, doi:10.1002/jemt.20092). Correlations,
+//! the period and lines were measured on real EDF images.
 
 use multiversion::multiversion;
 
@@ -44,7 +44,10 @@ pub(crate) fn correlate(
     own.iter_mut().enumerate().for_each(|(i, noise)| *noise /= deviation(i));
     // Rounding adds uncorrelated noise.
     let rounding_gain = 1.0 + ROUNDING / variance.max(ROUNDING);
-    let wanted = fusion.noise_correlation.map(|wanted| (wanted * rounding_gain).min(MAX_CORRELATION));
+    let wanted = fusion.noise_correlation.map(|wanted| wanted * rounding_gain);
+    let common = common_weight(wanted);
+    let wanted = wanted.map(|wanted| (wanted / (common * common)).min(MAX_CORRELATION));
+    let common = common as f32;
     select_largest(&mut own, width, channels);
     let shared = reduction::reduced(&own, width, channels, wanted, fusion.noise_skew, fusion.reduction);
     let lines = lines(&own, width, channels);
@@ -63,7 +66,7 @@ pub(crate) fn correlate(
             let structured = structure[at] / (structure[at] + half).max(f32::MIN_POSITIVE);
             let sharp = structure[at] / (structure[at] + variance as f32).max(f32::MIN_POSITIVE);
             let dark = (1.0 - expected[at] / bright).clamp(0.0, 1.0);
-            let correlated = 1.0 - ((1.0 - FIXED) * structured).max(DARK * dark);
+            let correlated = common - ((common - FIXED) * structured).max(DARK * dark);
             let uncorrelated = (1.0 - correlated * correlated + GAIN * sharp + DARK_GAIN * dark).sqrt();
             let noise = uncorrelated * own[at] + correlated * shared[at] + LINES * structured * lines[at];
             let level = expected[at] * (1.0 + read_out * columns[i / channels]) + deviation(at) * noise;
@@ -178,6 +181,17 @@ fn equalise(values: &mut [f32]) {
     for value in values {
         *value = (norm * value.abs().sqrt().sqrt()).copysign(*value);
     }
+}
+
+/// Weight of the correlated noise on the empty slide; the rest of its variance is uncorrelated. Fitted to the spectrum
+/// of the empty slide of real EDF images: after a filter alone, the power at the highest frequencies is too low.
+const COMMON: f64 = 0.95;
+
+/// Returns the weight of the correlated noise on the empty slide: [`COMMON`], or more if its neighbours could otherwise
+/// not have the wanted correlations.
+fn common_weight(wanted: [f64; 2]) -> f64 {
+    let least = wanted[0].max(wanted[1]) / MAX_CORRELATION;
+    least.sqrt().clamp(COMMON, 1.0)
 }
 
 /// Weight of the correlated noise on structure, where only the fixed pattern of the camera is correlated: measured on
@@ -420,6 +434,7 @@ mod tests {
             assert!((variance / wanted(0, 0, 1.0) - 1.0).abs() < 0.03, "{variance} {}", wanted(0, 0, 1.0));
             for (step, across, down, correlation) in [(1, 1, 0, 0.2), (WIDTH, 0, 1, 0.4)] {
                 let found = product(&noise, step);
+                let correlation = correlation / (COMMON * COMMON);
                 let wanted = wanted(across, down, correlation);
                 assert!((found - wanted).abs() < 0.03 * variance, "{step}: {found} {wanted}");
             }
@@ -471,8 +486,8 @@ mod tests {
         let dark = 1.0 - 0.1 / f64::from(BRIGHT);
         let stronger = 1.0 + f64::from(DARK_GAIN) * dark;
         assert!((variance / (900.0 * stronger) - 1.0).abs() < 0.03, "{variance}");
-        let correlated = 1.0 - f64::from(DARK) * dark;
-        let part = correlated * correlated / stronger;
+        let correlated = COMMON - f64::from(DARK) * dark;
+        let part = correlated * correlated / (COMMON * COMMON * stronger);
         let [across, down] = [1, WIDTH].map(|step| product(noise, step) / variance);
         assert!((across - 0.2 * part).abs() < 0.015 && (down - 0.4 * part).abs() < 0.015, "{across} {down}, {part}");
     }
