@@ -385,6 +385,24 @@ fn corrected(colour: bool) -> [usize; 2] {
     if colour { CORRECTIONS.map(|rounds| rounds * HUED) } else { [0; 2] }
 }
 
+/// Returns the standard deviation around each of `count` fields, given the error of its parameter and the standard
+/// deviation between fields.
+///
+/// A further field has a variance of 1 + 1/n times that between fields around the mean of n fields, because this mean
+/// has an error too; the n fields themselves have only 1 − 1/n.
+fn spread_around(error: f64, between: f64, count: usize) -> f64 {
+    (error * error + 2.0 * between * between / count as f64).sqrt()
+}
+
+/// Returns the usual standard deviation of a parameter around the initial recipe.
+fn near(setting: &Setting, parameter: Parameter) -> f64 {
+    match parameter {
+        Parameter::Pixel => PRIOR_SD,
+        Parameter::Blur if setting.extended => FUSED_SD,
+        _ => NEAR_SD,
+    }
+}
+
 /// Measures real fields: the mean over the samples of each, and the number of samples of a field.
 fn of_fields(fields: &[FieldImage], sampler: &Sampler, phase: &Phase) -> Result<(Vec<Summary>, usize), Error> {
     let one = |field: &FieldImage| -> Result<(Summary, usize), Error> {
@@ -512,14 +530,28 @@ impl Search<'_> {
     ) -> Result<Posterior, Error> {
         let fields: Vec<Vec<f64>> = self.real.iter().map(|field| field.values.clone()).collect();
         let varies: Vec<bool> = self.sought.iter().map(|parameter| setting.varies(*parameter)).collect();
-        let near = |parameter: &Parameter| match parameter {
-            Parameter::Pixel => PRIOR_SD,
-            Parameter::Blur if setting.extended => FUSED_SD,
-            _ => NEAR_SD,
-        };
-        let near: Vec<f64> = self.sought.iter().map(near).collect();
+        let near: Vec<f64> = self.sought.iter().map(|parameter| near(setting, *parameter)).collect();
         let prior = Knowledge { means: prior, near: &near, varies: &varies };
         Ok(Response::new(&self.rows, phase)?.posterior(&fields, self.samples, start, &prior))
+    }
+
+    /// Returns the parameters of a field, with the spread of further fields of the same kind around them.
+    fn field(&self, setting: &Setting, found: &Posterior, shared: &Values, field: usize) -> Values {
+        let mut values = self.values(&found.fields[field], Some(field));
+        for (c, parameter) in self.sought.iter().enumerate() {
+            if setting.varies(*parameter) {
+                let spread = spread_around(found.difference_errors[c], found.spreads[c], self.real.len());
+                values.set_spread(*parameter, parameter.prior().difference(spread));
+            } else {
+                values.set(*parameter, shared.get(*parameter));
+                values.set_spread(*parameter, shared.spread(*parameter));
+            }
+        }
+        for (parameter, _) in &self.measured.fields[field] {
+            let spread = spread_around(0.0, self.measured.spread(*parameter), self.real.len());
+            values.set_spread(*parameter, parameter.prior().difference(spread));
+        }
+        values
     }
 
     /// Returns all parameters and the recipe.
@@ -531,21 +563,12 @@ impl Search<'_> {
             (Source::Simulated, Some(c)) => found.is_visible(c),
             (Source::Simulated, None) => false,
         };
-        let fields: Vec<Values> = (0..self.real.len())
-            .map(|i| {
-                let mut values = self.values(&found.fields[i], Some(i));
-                for (c, parameter) in self.sought.iter().enumerate() {
-                    let prior = parameter.prior();
-                    if setting.varies(*parameter) {
-                        values.set_spread(*parameter, prior.difference(found.difference_errors[c]));
-                    } else {
-                        values.set(*parameter, prior.value(found.means[c]));
-                    }
-                }
-                values
-            })
-            .collect();
-        let mean = self.values(&found.means, None);
+        let mut mean = self.values(&found.means, None);
+        for (c, parameter) in self.sought.iter().enumerate().filter(|(_, parameter)| !setting.varies(**parameter)) {
+            let spread = found.errors[c].min(near(setting, *parameter));
+            mean.set_spread(*parameter, parameter.prior().difference(spread));
+        }
+        let fields: Vec<Values> = (0..self.real.len()).map(|i| self.field(setting, found, &mean, i)).collect();
         let one = |parameter: Parameter| {
             let prior = parameter.prior();
             let mut fit = ParameterFit::new(parameter, Origin::NotVisible, base.get(parameter));
@@ -567,9 +590,7 @@ impl Search<'_> {
                 fit.value = e.value;
                 fit.interval = [e.low, e.high];
                 fit.width = prior.place(e.high) - prior.place(e.low);
-                let places: Vec<f64> = fit.fields.iter().map(|value| prior.place(*value)).collect();
-                let sd = portable_numerics::statistics::deviation(&places);
-                fit.spread = if sd.is_finite() { prior.difference(sd) } else { 0.0 };
+                fit.spread = prior.difference(self.measured.spread(parameter));
             }
             fit
         };
@@ -581,6 +602,26 @@ impl Search<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use portable_numerics::random::below;
+
+    #[test]
+    fn fields_of_a_recipe_are_as_far_from_the_mean_of_the_real_ones_as_further_real_fields() {
+        const TRIALS: u64 = 20_000;
+        let square = |v: f64| v * v;
+        let rng = &mut Xoshiro256PlusPlus::seed_from_u64(5);
+        for count in [2, 4, 8] {
+            let [mut further, mut simulated] = [0.0; 2];
+            for _ in 0..TRIALS {
+                let fields: Vec<f64> = (0..count).map(|_| normal(rng)).collect();
+                let mean = fields.iter().sum::<f64>() / count as f64;
+                further += square(normal(rng) - mean) / TRIALS as f64;
+                let like = fields[below(count, rng)] + spread_around(0.0, 1.0, count) * normal(rng);
+                simulated += square(like - mean) / TRIALS as f64;
+            }
+            // Both have a standard error of about 1.5 %.
+            assert!((simulated / further - 1.0).abs() < 0.06, "{count}: {simulated} {further}");
+        }
+    }
 
     #[test]
     fn a_field_of_another_magnification_is_an_error() {

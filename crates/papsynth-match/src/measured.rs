@@ -68,6 +68,14 @@ impl Measured {
     pub fn get(&self, parameter: Parameter) -> Option<Estimate> {
         self.estimates.iter().find(|(p, _)| *p == parameter).map(|(_, e)| *e)
     }
+
+    /// Returns the standard deviation of a parameter between fields, as a difference of positions in its range.
+    pub(crate) fn spread(&self, parameter: Parameter) -> f64 {
+        let of_parameter = self.fields.iter().flatten().filter(|(p, _)| *p == parameter);
+        let places: Vec<f64> = of_parameter.map(|(_, value)| parameter.prior().place(*value)).collect();
+        let sd = portable_numerics::statistics::deviation(&places);
+        if sd.is_finite() { sd } else { 0.0 }
+    }
 }
 
 /// Returns the source of nuclei that all fields have.

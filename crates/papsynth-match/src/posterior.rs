@@ -56,9 +56,9 @@ pub(crate) const PRIOR_SD: f64 = 0.288_675_134_594_812_9;
 /// hardly show stays near the initial recipe. The intervals do not use it.
 pub(crate) const NEAR_SD: f64 = 0.12;
 
-/// The same for the blur of EDF images: an eighth. Their focus does not change it, and a few fields determine it badly,
+/// The same for the blur of EDF images: 7 %. Their focus does not change it, and a few fields determine it badly,
 /// because soft borders of nuclei look like blur.
-pub(crate) const FUSED_SD: f64 = 0.05;
+pub(crate) const FUSED_SD: f64 = 0.03;
 
 /// Steps of the EM algorithm, and of the search for the mean after each round.
 const EM_STEPS: usize = 100;

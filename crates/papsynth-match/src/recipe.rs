@@ -183,7 +183,7 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
     if on(P::StrayLight)
         && let Some(fraction) = stray_light(&mut r.optics)
     {
-        *fraction = number(get(P::StrayLight));
+        *fraction = cut(normal(get(P::StrayLight), sd(P::StrayLight)), 0.0, 0.5);
     }
     let stain = &mut r.stain;
     for (parameter, of_field, of_slide) in [

@@ -200,7 +200,7 @@ const FIXED: f32 = 0.87;
 
 /// Variance of structure, relative to that of noise, at which half of the change from the empty slide to structure is
 /// reached: fitted to the noise on cytoplasm and nuclei of real EDF images.
-const HALF_UNCORRELATED: f64 = 80.0;
+const HALF_UNCORRELATED: f64 = 60.0;
 
 /// Grey level, relative to the brightest place, below which noise is less correlated and stronger.
 const BRIGHT: f32 = 0.6;
@@ -218,7 +218,7 @@ const DARK: f32 = 0.5;
 const DARK_GAIN: f32 = 0.4;
 
 /// Amplitude of the lines along rows and columns in structured regions, relative to the noise filtered to such lines.
-const LINES: f32 = 2.3;
+const LINES: f32 = 2.6;
 
 /// Noise of a plane relative to that of the fused image: fitted to the decrease of noise just below the highest grey
 /// level of real EDF images, and to the histograms of their empty slide.

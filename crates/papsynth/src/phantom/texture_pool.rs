@@ -118,7 +118,21 @@ fn synthesized(kind: &TextureKind) -> Result<Vec<f32>, ErrorKind> {
     let synthesizer = Synthesizer::new(SIDE, SIDE, &params).map_err(ErrorKind::CytoplasmTexture)?;
     let image = synthesizer.synthesize(&kind.statistics, &mut rng).map_err(ErrorKind::CytoplasmTexture)?;
     let pyramid = Pyramid::new(SIDE, SIDE, &texture.pyramid).map_err(ErrorKind::CytoplasmTexture)?;
-    let mut bands = pyramid.decompose(&image);
+    let mut image = image;
+    for _ in 0..GAIN_STEPS {
+        image = with_octaves(&image, &pyramid, &kind.octaves);
+    }
+    let noise: Vec<f32> = (0..SIDE * SIDE).map(|_| random::normal(&mut rng) as f32).collect();
+    Ok(with_random_phases(&image, &noise))
+}
+
+/// Number of steps towards the strengths of the octaves: neighbouring bands of the pyramid overlap, so that the gain of
+/// one changes the strength of the next.
+const GAIN_STEPS: usize = 4;
+
+/// Scales the bands of an image to the strengths of the octaves.
+fn with_octaves(image: &[f32], pyramid: &Pyramid, octaves: &[f64]) -> Vec<f32> {
+    let mut bands = pyramid.decompose(image);
     let (last, scales) = (bands.oriented.len() + 1, bands.oriented.len());
     let variance =
         |values: &[f32]| values.iter().map(|v| f64::from(*v) * f64::from(*v)).sum::<f64>() / values.len() as f64;
@@ -129,11 +143,10 @@ fn synthesized(kind: &TextureKind) -> Result<Vec<f32>, ErrorKind> {
             _ => vec![&mut bands.low_pass],
         };
         let found: f64 = own.iter().map(|band| variance(band)).sum();
-        let gain = (kind.octaves[octave] * compensation(octave, scales) / found.max(1e-18).sqrt()) as f32;
+        let gain = (octaves[octave] * compensation(octave, scales) / found.max(1e-18).sqrt()) as f32;
         own.iter_mut().flat_map(|band| band.iter_mut()).for_each(|value| *value *= gain);
     }
-    let noise: Vec<f32> = (0..SIDE * SIDE).map(|_| random::normal(&mut rng) as f32).collect();
-    Ok(with_random_phases(&pyramid.reconstruct(&bands), &noise))
+    pyramid.reconstruct(&bands)
 }
 
 /// Replaces the phases of an image above the frequencies [`RANDOM_FROM`] by those of noise. Between the two frequencies
