@@ -133,17 +133,17 @@ const GAIN_STEPS: usize = 4;
 /// Scales the bands of an image to the strengths of the octaves.
 fn with_octaves(image: &[f32], pyramid: &Pyramid, octaves: &[f64]) -> Vec<f32> {
     let mut bands = pyramid.decompose(image);
-    let (last, scales) = (bands.oriented.len() + 1, bands.oriented.len());
+    let scales = bands.oriented.len();
     let variance =
         |values: &[f32]| values.iter().map(|v| f64::from(*v) * f64::from(*v)).sum::<f64>() / values.len() as f64;
-    for octave in 0..=last {
+    for (octave, strength) in octaves.iter().enumerate() {
         let mut own: Vec<&mut Vec<f32>> = match octave {
             0 => vec![&mut bands.high_pass],
             octave if octave <= scales => bands.oriented[octave - 1].iter_mut().map(|band| &mut band.real).collect(),
             _ => vec![&mut bands.low_pass],
         };
         let found: f64 = own.iter().map(|band| variance(band)).sum();
-        let gain = (octaves[octave] * compensation(octave, scales) / found.max(1e-18).sqrt()) as f32;
+        let gain = (strength * compensation(octave, scales) / found.max(1e-18).sqrt()) as f32;
         own.iter_mut().flat_map(|band| band.iter_mut()).for_each(|value| *value *= gain);
     }
     pyramid.reconstruct(&bands)
