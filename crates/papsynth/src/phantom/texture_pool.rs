@@ -116,9 +116,8 @@ fn synthesized(kind: &TextureKind) -> Result<Vec<f32>, ErrorKind> {
     let params = SynthesisParams { texture, ..SynthesisParams::default() };
     let mut rng = Key { seed: 0, index: 0 }.stream("texture", 0, &kind.name);
     let synthesizer = Synthesizer::new(SIDE, SIDE, &params).map_err(ErrorKind::CytoplasmTexture)?;
-    let image = synthesizer.synthesize(&kind.statistics, &mut rng).map_err(ErrorKind::CytoplasmTexture)?;
+    let mut image = synthesizer.synthesize(&kind.statistics, &mut rng).map_err(ErrorKind::CytoplasmTexture)?;
     let pyramid = Pyramid::new(SIDE, SIDE, &texture.pyramid).map_err(ErrorKind::CytoplasmTexture)?;
-    let mut image = image;
     for _ in 0..GAIN_STEPS {
         image = with_octaves(&image, &pyramid, &kind.octaves);
     }
