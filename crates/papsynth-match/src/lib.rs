@@ -5,6 +5,7 @@ mod compare;
 mod distance;
 mod error;
 mod fit;
+mod halo;
 mod hues;
 mod measured;
 mod noise;

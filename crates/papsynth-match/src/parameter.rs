@@ -104,8 +104,8 @@ parameters! {
     Photons: Simulated, All, Linear 0.05..0.95 "", "camera.full_well_e, camera.read_noise_e: part of photons";
     /// Blur beyond diffraction. The fields of EDF images share one value.
     Blur: Simulated, Field, Logarithmic 0.08..0.9 "um", "optics.extra_blur_um";
-    /// Stray light over the light of the empty slide.
-    StrayLight: Simulated, All, Linear 0.0..0.2 "", "optics.stray_light";
+    /// Fraction of the light that is stray light. Fields share one value if it is evenly distributed.
+    StrayLight: Simulated, Field, Linear 0.0..0.35 "", "optics.stray_light";
     /// Depth range of cells.
     Depth: Simulated, All, Logarithmic 0.5..12.0 "um", "slide.depth_um";
     /// Stain of the cytoplasm of a field.

@@ -54,10 +54,18 @@ impl Setting {
     }
 
     /// Returns whether a parameter differs between fields. The blur of EDF images does not: each part comes from the
-    /// plane in which it is sharpest.
+    /// plane in which it is sharpest. Evenly distributed stray light does not either.
     #[must_use]
     pub fn varies(&self, parameter: P) -> bool {
-        parameter.prior().level == Level::Field && !(self.extended && parameter == P::Blur)
+        let is_shared = match parameter {
+            P::Blur => self.extended,
+            P::StrayLight => match &self.base.optics {
+                Optics::BrightField(Microscope { stray_light_um, .. }) => centre(stray_light_um) <= 0.0,
+                Optics::Gaussian(_) => true,
+            },
+            _ => false,
+        };
+        parameter.prior().level == Level::Field && !is_shared
     }
 
     /// Returns the values of the initial recipe.

@@ -4,6 +4,7 @@ use papsynth_judge::number::{single, whole};
 use papsynth_judge::{Control, FeatureTable, Field, FieldImage, Statistics};
 
 use crate::error::Error;
+use crate::halo::halo;
 use crate::hues::{HUES, Hues, hues};
 use crate::noise;
 use crate::objects;
@@ -171,6 +172,7 @@ impl Summary {
         let [fine, coarse] = noise::unevenness(grey, width, empty);
         all.put("unevenness of the light, finely", fine);
         all.put("unevenness of the light, coarsely", coarse);
+        all.put("halo of objects", halo(grey, width, empty, sampler.pixel_um));
         control.check()?;
         for (name, value) in objects::counts(grey, width, single(empty)) {
             all.put(name, value);

@@ -20,7 +20,7 @@ fn engine(recipe: &Recipe) -> Result<Engine, papsynth::Error> {
 }
 
 fn setting(size_px: [usize; 2]) -> Setting {
-    setting_of(Preset::Lbc.recipe(), size_px)
+    setting_of(Preset::Lbc.recipe().fused(), size_px)
 }
 
 fn setting_of(base: Recipe, size_px: [usize; 2]) -> Setting {
@@ -60,11 +60,11 @@ fn truth(setting: &Setting, off: f64, apart: f64) -> Recipe {
 }
 
 fn small(pixel: PixelSize, rounds: usize) -> Match {
-    with_seed(pixel, rounds, 5)
+    with(pixel, rounds, 60, 5)
 }
 
-fn with_seed(pixel: PixelSize, rounds: usize, seed: u64) -> Match {
-    let params = MatchParams { pixel, simulations: 60, rounds, refine: 0, seed };
+fn with(pixel: PixelSize, rounds: usize, simulations: usize, seed: u64) -> Match {
+    let params = MatchParams { pixel, simulations, rounds, refine: 0, seed };
     Match::new(&params, &Preset::Lbc.recipe()).unwrap()
 }
 
@@ -80,7 +80,9 @@ fn of(fit: &Fit, parameter: Parameter) -> &ParameterFit {
 #[test]
 fn a_match_finds_the_parameters_and_does_not_depend_on_the_number_of_threads() {
     let fields = fields(4, NucleiFrom::Masks, 0.3);
-    let matching = small(PixelSize::Known(PIXEL_UM), 2);
+    // With half as many simulations, the order of the fields depends on the draws.
+    let with_seed = |seed: u64| with(PixelSize::Known(PIXEL_UM), 2, 120, seed);
+    let matching = with_seed(5);
     let [one, two] = [1, 2].map(|threads| on_threads(threads, &fields, &matching));
     // Compared as text, because NaN differs from itself.
     let text = |fit: &Fit| serde_json::to_string(fit).unwrap();
@@ -117,7 +119,7 @@ fn a_match_finds_the_parameters_and_does_not_depend_on_the_number_of_threads() {
     assert!(cells.fields[3] > 1.15 * cells.fields[0] && cells.spread > 0.08, "{cells:?}");
     // Fields of the true recipe are as far from these four as four and sixteen fields are. Both matches together remove
     // at least half of the rest of the distance; each depends on its draws.
-    let other = on_threads(2, &fields, &with_seed(PixelSize::Known(PIXEL_UM), 2, 6));
+    let other = on_threads(2, &fields, &with_seed(6));
     let floors = [5, 6].map(|seed| {
         let params = MatchParams { pixel: PixelSize::Known(PIXEL_UM), simulations: 60, rounds: 0, refine: 0, seed };
         on_threads(2, &fields, &Match::new(&params, &truth(&setting(FIELD), 0.0, 0.0)).unwrap()).distance.before

@@ -518,7 +518,8 @@ class Cytoplasm(Section):
 
     texture: Number | None = None
     """Factor on the strength of the fine texture of the cytoplasm in the model: grains, networks and fibres. Matched to
-    the 24 fields of Cervix93, it is 0.43 to 1.04, with a median of 0.61. From 0 to 20.
+    the 24 fields of Cervix93, which are EDF images, it is 0.43 to 1.04, with a median of 0.61. Without their blur,
+    grains of this strength look too even, so that the default is lower. From 0 to 20.
     """
 
     texture_size: Number | None = None
@@ -1198,7 +1199,12 @@ class OpticsBrightField(Section):
     """
 
     stray_light: Number | None = None
-    """Fraction of the light of an empty field that is evenly distributed stray light (glare). From 0 to 0.5."""
+    """Fraction of the light that is stray light (glare). From 0 to 0.5."""
+
+    stray_light_um: Number | None = None
+    """Distance over which stray light spreads: half of it is a Gaussian of this standard deviation, and a quarter each
+    is 2 and 4 times as wide. 0 distributes the light evenly over the field, as in frames of a slide. From 0 to 50 µm.
+    """
 
     oversampling: Number | None = None
     """Oversampling: number of samples per pixel in x and in y. From 1 to 4."""

@@ -198,8 +198,11 @@ section! {
         /// Standard deviation of additional blur: relay optics, charge diffusion, vibration. 0.16 gives the edge width
         /// measured in the paper, 0.9 px.
         extra_blur_um: Number = 0.16, 0..=10, "µm";
-        /// Fraction of the light of an empty field that is evenly distributed stray light (glare).
+        /// Fraction of the light that is stray light (glare).
         stray_light: Number = Number::uniform(0.01, 0.04), 0..=0.5;
+        /// Distance over which stray light spreads: half of it is a Gaussian of this standard deviation, and a quarter
+        /// each is 2 and 4 times as wide. 0 distributes the light evenly over the field, as in frames of a slide.
+        stray_light_um: Number = 0.0, 0..=50, "µm";
         /// Oversampling: number of samples per pixel in x and in y.
         oversampling: Count = 2, 1..=4;
         /// Imaging model.

@@ -88,13 +88,14 @@ impl Recipe {
         if let (Optics::BrightField(own), Optics::BrightField(like)) = (&mut self.optics, like.optics) {
             own.extra_blur_um = like.extra_blur_um;
             own.stray_light = like.stray_light;
+            own.stray_light_um = like.stray_light_um;
         }
         macro_rules! take {
             ($($section:ident.$number:ident),*) => {
                 $(self.$section.$number = like.$section.$number;)*
             };
         }
-        take!(nucleus.edge_um, nucleus.clumping, cytoplasm.rim_um);
+        take!(nucleus.edge_um, nucleus.clumping, cytoplasm.rim_um, cytoplasm.texture);
         take!(camera.prnu, camera.full_well_e, camera.glare_subtracted, camera.read_noise_e, camera.sensor_dust);
         take!(stain.slide_cytoplasm, stain.slide_nucleus, stain.field_texture);
         self.debris.out_of_focus.count = like.debris.out_of_focus.count;

@@ -313,10 +313,11 @@ section! {
         /// Amplitude of the third level of detail, the cytoskeleton, relative to the absorbance of the cytoplasm.
         cytoskeleton: Number = Number::uniform(0.05, 0.18), 0..=2;
         /// Factor on the strength of the fine texture of the cytoplasm in the model: grains, networks and fibres.
-        /// Matched to the 24 fields of Cervix93, it is 0.43 to 1.04, with a median of 0.61.
+        /// Matched to the 24 fields of Cervix93, which are EDF images, it is 0.43 to 1.04, with a median of 0.61.
+        /// Without their blur, grains of this strength look too even, so that the default is lower.
         texture: Number
             (given [f64; 2] as texture: "Standard deviation of the fine texture of the outer and of the inner cytoplasm, relative to their absorbance.")
-            = 0.62, 0..=20;
+            = 0.47, 0..=20;
         /// Factor on the sizes of the fine texture of the cytoplasm. Its strength stays the same.
         texture_size: Number (given f64) = Number::log_normal(0.94, 0.2).at_least(0.4).at_most(2.5), 0.2..=5;
         /// Probability that a cell is granular.

@@ -32,7 +32,7 @@ const RANGES: &[(&str, f64, f64)] = &[
     ("wavelength_um", 0.4, 0.7), ("bandwidth_um", 0.0, 0.1), ("lamp_k", 2000.0, 10_000.0), ("chromatic_um", -10.0, 10.0),
     ("na", 0.05, 1.6), ("condenser_na", 0.05, 1.6), ("mount_index", 1.0, 2.0), ("immersion_index", 1.0, 2.0),
     ("cover_error_um", -50.0, 50.0), ("spherical", -1.0, 1.0), ("coma", -1.0, 1.0), ("astigmatism", -1.0, 1.0),
-    ("extra_blur_um", 0.0, 10.0), ("stray_light", 0.0, 0.5), ("oversampling", 1.0, 4.0), ("slab_um", 0.1, 10.0),
+    ("extra_blur_um", 0.0, 10.0), ("stray_light", 0.0, 0.5), ("stray_light_um", 0.0, 50.0), ("oversampling", 1.0, 4.0), ("slab_um", 0.1, 10.0),
     ("directions", 1.0, 65_536.0), ("sigma_xy_um", 0.0, 20.0), ("sigma_z_um_per_um", 0.0, 10.0), ("feather_um", 0.0, 5.0),
     ("bits", 8.0, 16.0), ("full_well_e", 10.0, 1e7), ("read_noise_e", 0.0, 1e5), ("read_noise_rms_e", 0.0, 1e5),
     ("offset_dn", 0.0, 32_768.0), ("glare_subtracted", 0.0, 0.8), ("prnu", 0.0, 0.5), ("dsnu_e", 0.0, 1e5), ("sensor_dust", 0.0, 1e4),

@@ -16,6 +16,7 @@ use super::channel_lights::{ChannelLight, LightGroup, MicroscopeCache, light_gro
 use super::light::{FocusAt, LightBuffers, Specimen, TransmissionStats};
 use super::object_transmission::{DyeMixer, ObjectTransmission, TransmissionLayer, Window, add, clear};
 use super::overlap::Overlaps;
+use super::stray_light::{Absorbed, Spread};
 use crate::detect::sum_over;
 use crate::error::ErrorKind;
 use crate::phantom::tile::Tile;
@@ -33,6 +34,8 @@ pub(crate) struct BrightFieldPath {
     optics: SceneMicroscope,
     /// Blur of the combined light, if any.
     pub(super) extra_blur: Option<Gaussian>,
+    /// Spread of the stray light, unless it is evenly distributed.
+    spread: Option<Spread>,
     restoration: Option<Gaussian>,
     groups: Vec<LightGroup>,
     /// Correction of overlapping colours, if the light is coloured.
@@ -88,6 +91,9 @@ impl BrightFieldPath {
         let extra_blur = || Gaussian::truncated(optics.extra_blur_um / scene.view.pixel_um, Method::Direct, LOST_TAIL);
         let extra_blur = (optics.extra_blur_um > 0.0).then(extra_blur).transpose();
         let extra_blur = extra_blur.map_err(|error| ErrorKind::Optics("optics.extra_blur_um", error))?;
+        // Frames of a slide have the same pixels where they overlap.
+        let is_local = optics.stray_light_um > 0.0 && optics.stray_light > 0.0 && scene.frame.is_none();
+        let spread = is_local.then(|| Spread::new(optics.stray_light_um / scene.view.pixel_um)).transpose()?;
         let imaged = specimen.phantoms.iter().flat_map(|phantom| &phantom.pieces).any(|piece| piece.imaged);
         let restores = scene.restoration.restore != Restore::Off && imaged;
         let feather = || Gaussian::new(scene.restoration.feather_um / scene.view.pixel_um);
@@ -95,6 +101,7 @@ impl BrightFieldPath {
         Ok(Self {
             optics: *optics,
             extra_blur,
+            spread,
             restoration,
             // Patches of many single wavelengths would need too much memory.
             cached_patches: (scene.planes_um.len() > 1 && groups.len() == 1)
@@ -212,13 +219,30 @@ impl BrightFieldPath {
         Ok(absorbances)
     }
 
-    /// Converts transmitted fractions to light in some rows: B·(s + (1 − s)·∏), where s is the stray light.
-    pub(super) fn illuminate(&self, light: &mut LightBuffers, rows: Range<usize>) {
-        let LightBuffers { empty_log10, channels, empty, .. } = light;
-        clear(empty, rows.len());
-        exp10_from(&empty_log10[rows.clone()], empty);
-        for channel in channels {
-            illuminate(&mut channel[rows.clone()], empty, self.optics.stray_light as f32);
+    /// Converts transmitted fractions to light in some rows: B·(s·(1 − K∗(1 − ∏)) + (1 − s)·∏), where s is the stray
+    /// light and K the kernel by which it spreads, 0 if it is evenly distributed.
+    pub(super) fn illuminate(&self, light: &mut LightBuffers, width: usize, rows: Range<usize>) {
+        let LightBuffers { empty_log10, channels, empty, absorbed, scratch, .. } = light;
+        if let Some(spread) = self.spread.as_ref().filter(|_| rows.start == 0) {
+            absorbed.resize_with(channels.len(), Absorbed::default);
+            for (channel, absorbed) in channels.iter().zip(&mut *absorbed) {
+                spread.of(channel, width, absorbed, scratch);
+            }
+        }
+        let pixels = rows.start * width..rows.end * width;
+        clear(empty, pixels.len());
+        exp10_from(&empty_log10[pixels.clone()], empty);
+        let stray = self.optics.stray_light as f32;
+        for (index, channel) in channels.iter_mut().enumerate() {
+            let light = &mut channel[pixels.clone()];
+            if self.spread.is_none() {
+                illuminate(light, empty, stray);
+                continue;
+            }
+            let lines = light.chunks_exact_mut(width).zip(empty.chunks_exact(width));
+            for (y, (light, empty)) in rows.clone().zip(lines) {
+                illuminate_locally(light, empty, absorbed[index].row(y, width), stray);
+            }
         }
     }
 
@@ -471,6 +495,13 @@ fn add_light(channel: &mut [f32], light: &[f32], weight: f32) {
 #[multiversion(targets = "simd")]
 fn illuminate(light: &mut [f32], empty: &[f32], stray: f32) {
     light.iter_mut().zip(empty).for_each(|(light, empty)| *light = empty * (stray + (1.0 - stray) * *light));
+}
+
+#[multiversion(targets = "simd")]
+fn illuminate_locally(light: &mut [f32], empty: &[f32], absorbed: &[f32], stray: f32) {
+    for ((light, empty), absorbed) in light.iter_mut().zip(empty).zip(absorbed) {
+        *light = empty * (stray * (1.0 - absorbed) + (1.0 - stray) * *light);
+    }
 }
 
 /// Returns the absorbance that corresponds to the mean of a factor over a mask.

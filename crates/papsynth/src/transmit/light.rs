@@ -5,6 +5,7 @@ use rand_core::Rng;
 
 use super::bright_field::SpareBuffers;
 use super::sensor_dust;
+use super::stray_light::Absorbed;
 use crate::error::ErrorKind;
 use crate::phantom::Phantom;
 use crate::render::Work;
@@ -42,6 +43,8 @@ pub(crate) struct LightBuffers {
     pub(super) spare: SpareBuffers,
     /// Rows of the light of the empty slide.
     pub(super) empty: Vec<f32>,
+    /// Absorbed fractions of each channel, spread by stray light.
+    pub(super) absorbed: Vec<Absorbed>,
     pub(super) bands: Vec<Vec<f32>>,
     pub(super) scratch: optics_psf::Scratch,
 }

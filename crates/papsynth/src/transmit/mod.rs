@@ -11,6 +11,7 @@ mod light;
 mod object_transmission;
 mod overlap;
 mod sensor_dust;
+mod stray_light;
 
 use optics_psf::{Border, Gaussian};
 use portable_numerics::elementary::exp10_from;
@@ -74,11 +75,14 @@ impl LightPath {
         for first in (0..height).step_by(BAND_ROWS) {
             let end = (first + BAND_ROWS).min(height);
             let needed = (end + self.image_blur_radius_px()).min(height);
-            let rows = lit * width..needed * width;
+            let rows = lit..needed;
             match self {
                 // 10^(I_b − I_p).
-                Self::Gaussian(_) => exp10_from(&light.empty_log10[rows.clone()], &mut light.channels[0][rows]),
-                Self::BrightField(path) => path.illuminate(light, rows),
+                Self::Gaussian(_) => {
+                    let pixels = rows.start * width..rows.end * width;
+                    exp10_from(&light.empty_log10[pixels.clone()], &mut light.channels[0][pixels]);
+                }
+                Self::BrightField(path) => path.illuminate(light, width, rows),
             }
             let LightBuffers { channels, bands, scratch, .. } = light;
             lit = needed;

@@ -38,17 +38,25 @@ fn empty() -> Recipe {
 }
 
 fn set(recipe: &mut Recipe, change: impl FnOnce(Fields<'_>)) {
-    let Optics::BrightField(Microscope { condenser_na, stray_light, extra_blur_um, imaging, mount_index, .. }) =
-        &mut recipe.optics
+    let Optics::BrightField(Microscope {
+        condenser_na,
+        stray_light,
+        stray_light_um,
+        extra_blur_um,
+        imaging,
+        mount_index,
+        ..
+    }) = &mut recipe.optics
     else {
         panic!("the default is bright field")
     };
-    change(Fields { condenser_na, stray_light, extra_blur_um, imaging, mount_index });
+    change(Fields { condenser_na, stray_light, stray_light_um, extra_blur_um, imaging, mount_index });
 }
 
 struct Fields<'a> {
     condenser_na: &'a mut Number,
     stray_light: &'a mut Number,
+    stray_light_um: &'a mut Number,
     extra_blur_um: &'a mut Number,
     imaging: &'a mut Imaging,
     mount_index: &'a mut Number,
@@ -96,6 +104,25 @@ fn an_empty_slide_has_the_background_level_with_any_optics() {
         light(&recipe).iter().all(|v| (v / 65_535.0 - 0.8).abs() < 1e-4),
         "stray light does not change the empty field"
     );
+    set(&mut recipe, |optics| *optics.stray_light_um = 5.0.into());
+    assert!(light(&recipe).iter().all(|v| (v / 65_535.0 - 0.8).abs() < 1e-4), "nor does local stray light");
+}
+
+#[test]
+fn local_stray_light_is_weaker_near_objects_than_even_stray_light() {
+    let mut recipe = small();
+    let with = |fraction: f64, um: f64, recipe: &mut Recipe| {
+        set(recipe, |optics| (*optics.stray_light, *optics.stray_light_um) = (fraction.into(), um.into()));
+        light(recipe)
+    };
+    let [none, even, local] = [(0.0, 0.0), (0.2, 0.0), (0.2, 5.0)].map(|(s, um)| with(s, um, &mut recipe));
+    // Nothing becomes brighter than with even stray light, and cells and their surroundings become darker.
+    let darker = |a: &[f32], b: &[f32]| a.iter().zip(b).filter(|(a, b)| **a < *b - 65.0).count();
+    assert_eq!(darker(&even, &local), 0);
+    assert!(darker(&local, &even) > even.len() / 20 && darker(&none, &local) > 0 && darker(&local, &none) > 0);
+    // The light is the same in the mean, but for what spreads beyond the border.
+    let mean = |light: &[f32]| light.iter().map(|v| f64::from(*v)).sum::<f64>() / light.len() as f64;
+    assert!((mean(&local) / mean(&none) - 1.0).abs() < 1e-3, "{} {}", mean(&local), mean(&none));
 }
 
 #[test]
