@@ -111,7 +111,7 @@ parameters! {
     /// Stain of the cytoplasm of a field.
     FieldCytoplasm: Simulated, Field, Logarithmic 0.35..2.5 "", "stain.field_cytoplasm";
     /// Stain of the nuclei of a field.
-    FieldNucleus: Simulated, Field, Logarithmic 0.35..2.0 "", "stain.field_nucleus";
+    FieldNucleus: Simulated, Field, Logarithmic 0.35..3.5 "", "stain.field_nucleus";
     /// Contrast of chromatin.
     Texture: Simulated, Field, Logarithmic 0.1..2.5 "", "stain.field_texture";
     /// Factor on the standard deviation of the absorbance of cytoplasm between cells.

@@ -30,7 +30,7 @@ const GAP: u32 = 4;
 const FACTOR: f64 = 4.0;
 
 /// High values of parameters that are 0 by default, by the last part of the path.
-const HIGH_OF_ZERO: [(&str, f64); 19] = [
+const HIGH_OF_ZERO: [(&str, f64); 20] = [
     ("centre_um", 3.0),
     ("cover_error_um", 60.0),
     ("spherical", 0.15),
@@ -38,6 +38,7 @@ const HIGH_OF_ZERO: [(&str, f64); 19] = [
     ("astigmatism", 0.15),
     ("stray_light", 0.3),
     ("stray_light_um", 20.0),
+    ("absorption_variation", 1.0),
     ("chromatic_um", 2.0),
     ("blooming", 1.0),
     ("jpeg_quality", 8.0),

@@ -89,7 +89,7 @@ pub(crate) fn scene(index: u64, planes: usize, bits: u32) -> Scene {
             texture: 0.01,
             texture_um: 60.0,
         },
-        light: SceneLight::Monochrome { wavelength_um: 0.57, bandwidth_um: 0.01 },
+        light: SceneLight::Monochrome { wavelength_um: 0.57, bandwidth_um: 0.01, absorption_variation: 0.0 },
         optics: SceneOptics::Gaussian { sigma_xy_um: 0.225, sigma_z_um_per_um: 0.25 },
         restoration: Restoration { restore: Restore::Off, feather_um: 1.0 },
         dyes: SceneDyes { nucleus: [0.0; 5], bacillus: [0.0; 5], speckle: [0.0; 5] },

@@ -1028,7 +1028,7 @@ class Leukocytes(Section):
 
 @dataclass(kw_only=True, slots=True)
 class LightSectionMonochrome(Section):
-    """A grey image in the light of an interference filter."""
+    """A grey image in the light of one filter."""
 
     kind: Literal["monochrome"] = "monochrome"
 
@@ -1037,6 +1037,12 @@ class LightSectionMonochrome(Section):
 
     bandwidth_um: Number | None = None
     """Bandwidth of the filter. From 0 to 0.1 µm."""
+
+    absorption_variation: Number | None = None
+    """Coefficient of variation of the stains' absorption over the wavelengths of the light, in bright field. In light
+    of one wavelength it is 0 and absorbances of overlapping objects add up; in a broad band they add up to less. From 0
+    to 1.
+    """
 
 
 @dataclass(kw_only=True, slots=True)

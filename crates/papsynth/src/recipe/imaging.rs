@@ -107,7 +107,7 @@ section! {
 section! {
     /// Light: monochrome or colour.
     pub enum LightSection, by default Monochrome {
-        /// A grey image in the light of an interference filter.
+        /// A grey image in the light of one filter.
         Monochrome(Monochrome),
         /// A colour image: halogen lamp, colour camera, white balance on the empty slide.
         Colour(Colour),
@@ -115,12 +115,16 @@ section! {
 }
 
 section! {
-    /// The light of one interference filter.
+    /// The light of one interference filter, or of a broad band.
     pub struct Monochrome {
         /// Wavelength of the filter (the paper: 0.57, the highest contrast of nuclei).
         wavelength_um: Number = 0.57, 0.4..=0.7, "µm";
         /// Bandwidth of the filter.
         bandwidth_um: Number = 0.01, 0..=0.1, "µm";
+        /// Coefficient of variation of the stains' absorption over the wavelengths of the light, in bright field. In
+        /// light of one wavelength it is 0 and absorbances of overlapping objects add up; in a broad band they add up
+        /// to less.
+        absorption_variation: Number = 0.0, 0..=1;
     }
 }
 

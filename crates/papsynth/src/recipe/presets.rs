@@ -1,6 +1,6 @@
 //! The presets: recipes to start from. Each is a file in `presets/` with the differences from the default recipe.
 
-use super::imaging::{Focus, Optics};
+use super::imaging::{Focus, LightSection, Optics};
 use super::whole::Recipe;
 use crate::words::words;
 
@@ -89,6 +89,9 @@ impl Recipe {
             own.extra_blur_um = like.extra_blur_um;
             own.stray_light = like.stray_light;
             own.stray_light_um = like.stray_light_um;
+        }
+        if let (LightSection::Monochrome(own), LightSection::Monochrome(like)) = (&mut self.light, like.light) {
+            own.absorption_variation = like.absorption_variation;
         }
         macro_rules! take {
             ($($section:ident.$number:ident),*) => {

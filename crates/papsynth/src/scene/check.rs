@@ -29,7 +29,7 @@ const RANGES: &[(&str, f64, f64)] = &[
     ("noise_correlation", 0.0, 0.5), ("noise_skew", -0.1, 0.1), ("reduction", 1.0, 1.3), ("column_pattern", 0.0, 0.05),
     ("level", 1e-3, 2.0), ("exponent", 0.0, 10.0), ("falloff_x", 0.0, 1.0), ("falloff_y", 0.0, 1.0), ("illumination.centre", -10.0, 10.0),
     ("background.texture", 0.0, 1.0), ("texture_um", 0.1, 1e5),
-    ("wavelength_um", 0.4, 0.7), ("bandwidth_um", 0.0, 0.1), ("lamp_k", 2000.0, 10_000.0), ("chromatic_um", -10.0, 10.0),
+    ("wavelength_um", 0.4, 0.7), ("bandwidth_um", 0.0, 0.1), ("absorption_variation", 0.0, 1.0), ("lamp_k", 2000.0, 10_000.0), ("chromatic_um", -10.0, 10.0),
     ("na", 0.05, 1.6), ("condenser_na", 0.05, 1.6), ("mount_index", 1.0, 2.0), ("immersion_index", 1.0, 2.0),
     ("cover_error_um", -50.0, 50.0), ("spherical", -1.0, 1.0), ("coma", -1.0, 1.0), ("astigmatism", -1.0, 1.0),
     ("extra_blur_um", 0.0, 10.0), ("stray_light", 0.0, 0.5), ("stray_light_um", 0.0, 50.0), ("oversampling", 1.0, 4.0), ("slab_um", 0.1, 10.0),

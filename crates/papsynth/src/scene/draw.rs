@@ -190,6 +190,7 @@ fn light(recipe: &Recipe, field: &FieldNumbers) -> SceneLight {
         LightSection::Monochrome(light) => SceneLight::Monochrome {
             wavelength_um: field.draw(named!("light", light.wavelength_um)),
             bandwidth_um: field.draw(named!("light", light.bandwidth_um)),
+            absorption_variation: field.draw(named!("light", light.absorption_variation)),
         },
         LightSection::Colour(light) => SceneLight::Colour {
             lamp_k: field.draw(named!("light", light.lamp_k)),

@@ -93,12 +93,14 @@ impl SceneIllumination {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum SceneLight {
-    /// One interference filter.
+    /// One filter.
     Monochrome {
         /// Wavelength, µm.
         wavelength_um: f64,
         /// Bandwidth, µm.
         bandwidth_um: f64,
+        /// Coefficient of variation of the stains' absorption over the wavelengths.
+        absorption_variation: f64,
     },
     /// Colour.
     Colour {

@@ -12,6 +12,7 @@ use optics_psf::{
 };
 use portable_numerics::elementary::exp10_from;
 
+use super::broad_band::BroadBand;
 use super::channel_lights::{ChannelLight, LightGroup, MicroscopeCache, light_groups};
 use super::light::{FocusAt, LightBuffers, Specimen, TransmissionStats};
 use super::object_transmission::{DyeMixer, ObjectTransmission, TransmissionLayer, Window, add, clear};
@@ -36,6 +37,7 @@ pub(crate) struct BrightFieldPath {
     pub(super) extra_blur: Option<Gaussian>,
     /// Spread of the stray light, unless it is evenly distributed.
     spread: Option<Spread>,
+    broad_band: Option<BroadBand>,
     restoration: Option<Gaussian>,
     groups: Vec<LightGroup>,
     /// Correction of overlapping colours, if the light is coloured.
@@ -102,6 +104,10 @@ impl BrightFieldPath {
             optics: *optics,
             extra_blur,
             spread,
+            broad_band: match scene.light {
+                SceneLight::Monochrome { absorption_variation, .. } => BroadBand::new(absorption_variation),
+                SceneLight::Colour { .. } => None,
+            },
             restoration,
             // Patches of many single wavelengths would need too much memory.
             cached_patches: (scene.planes_um.len() > 1 && groups.len() == 1)
@@ -165,6 +171,17 @@ impl BrightFieldPath {
                     sums.resize(absorbances.len(), 0.0);
                     sums.iter_mut().zip(absorbances).for_each(|(sum, value)| *sum += weight * value);
                 }
+            }
+        }
+        if let Some(band) = self.broad_band {
+            for (channel, absorbances) in channels.iter_mut().zip(&mut stats.absorbances) {
+                let pieces = specimen.phantoms.iter().flat_map(|phantom| &phantom.pieces);
+                for (absorbance, piece) in absorbances.iter_mut().zip(pieces) {
+                    let area = piece.mask.area() as f64;
+                    let sum = sum_over(piece.mask.runs(), channel, width, [0; 2]);
+                    *absorbance = if area > 0.0 { band.absorbance(*absorbance, sum / area) } else { 0.0 };
+                }
+                band.convert(channel);
             }
         }
         Ok(stats)

@@ -60,7 +60,7 @@ pub(super) fn light_groups(
         LightGroup { mixer, lights, fractions }
     };
     match scene.light {
-        SceneLight::Monochrome { wavelength_um, bandwidth_um } => {
+        SceneLight::Monochrome { wavelength_um, bandwidth_um, .. } => {
             let imager = microscopes.get(&params(wavelength_um, bandwidth_um))?;
             let light = ChannelLight { imager, shift_um: 0.0, weights: vec![1.0] };
             Ok(vec![group(DyeMixer::Monochrome(wavelength_um), vec![light])])

@@ -5,6 +5,7 @@
 //! rows.
 
 mod bright_field;
+mod broad_band;
 mod channel_lights;
 mod gaussian;
 mod light;

@@ -126,6 +126,29 @@ fn local_stray_light_is_weaker_near_objects_than_even_stray_light() {
 }
 
 #[test]
+fn in_a_broad_band_dark_places_are_brighter_and_pale_ones_stay() {
+    let mut recipe = small();
+    recipe.cells.values_mut().for_each(|mix| mix.count = 8.0.into());
+    let mut at = |variation: f64| {
+        let absorption_variation = variation.into();
+        recipe.light = LightSection::Monochrome(Monochrome { absorption_variation, ..Monochrome::default() });
+        light(&recipe)
+    };
+    let [narrow, broad] = [0.0, 0.7].map(&mut at);
+    let brighter = |from: f32, to: f32| {
+        let inside = narrow.iter().zip(&broad).filter(|(narrow, _)| (from..to).contains(*narrow));
+        let (count, sum) = inside.fold((0, 0.0), |(count, sum), (narrow, broad)| (count + 1, sum + broad / narrow));
+        assert!(count > 20, "{from} {count}");
+        sum / count as f32
+    };
+    let darkest = narrow.iter().copied().fold(f32::INFINITY, f32::min);
+    let empty = narrow.iter().copied().fold(0.0, f32::max);
+    assert!(brighter(darkest, 1.3 * darkest) > 1.15, "{}", brighter(darkest, 1.3 * darkest));
+    assert!((brighter(0.97 * empty, 1.1 * empty) - 1.0).abs() < 1e-3);
+    assert!(narrow.iter().zip(&broad).all(|(narrow, broad)| *broad > narrow - 2.0));
+}
+
+#[test]
 fn the_product_model_approximates_the_abbe_model_and_gaussians_do_not() {
     let mut recipe = small();
     recipe.debris.bacilli.clusters = 3.0.into();
@@ -290,6 +313,7 @@ fn per_wavelength_colour_is_the_weighted_sum_of_monochrome_images() {
         recipe.light = LightSection::Monochrome(Monochrome {
             wavelength_um: nodes[0].wavelength_um.into(),
             bandwidth_um: 0.0.into(),
+            ..Monochrome::default()
         });
         let grey = light(&recipe);
         for (pixel, value) in sums.chunks_exact_mut(3).zip(&grey) {
@@ -358,8 +382,11 @@ fn a_grey_stain_is_the_same_at_every_wavelength() {
     recipe.stain.field_balance = 0.0.into();
     recipe.stain.cell_balance = 0.0.into();
     let mut at = |wavelength_um: f64| {
-        recipe.light =
-            LightSection::Monochrome(Monochrome { wavelength_um: wavelength_um.into(), bandwidth_um: 0.01.into() });
+        recipe.light = LightSection::Monochrome(Monochrome {
+            wavelength_um: wavelength_um.into(),
+            bandwidth_um: 0.01.into(),
+            ..Monochrome::default()
+        });
         light(&recipe)
     };
     assert_eq!(at(0.45), at(0.65));
@@ -372,8 +399,11 @@ fn nuclei_stand_out_most_near_the_papers_filter() {
     mix.count = 1.0.into();
     recipe.cells = [("intermediate".to_owned(), mix)].into();
     let mut contrast = |wavelength_um: f64| {
-        recipe.light =
-            LightSection::Monochrome(Monochrome { wavelength_um: wavelength_um.into(), bandwidth_um: 0.0.into() });
+        recipe.light = LightSection::Monochrome(Monochrome {
+            wavelength_um: wavelength_um.into(),
+            bandwidth_um: 0.0.into(),
+            ..Monochrome::default()
+        });
         let frame = frame(&recipe, 0);
         let objects = &frame.finished.truth.objects;
         objects.iter().find(|o| o.part == Part::Nucleus).unwrap().detectability[0]
@@ -422,7 +452,11 @@ fn invalid_apertures_are_reported_with_their_field() {
     let text = problems(&|recipe| set(recipe, |optics| *optics.condenser_na = 1.55.into()));
     assert!(text.contains("optics.condenser_na") && text.contains("less than 1.515"), "{text}");
     let text = problems(&|recipe| {
-        recipe.light = LightSection::Monochrome(Monochrome { wavelength_um: 0.0.into(), bandwidth_um: 0.01.into() });
+        recipe.light = LightSection::Monochrome(Monochrome {
+            wavelength_um: 0.0.into(),
+            bandwidth_um: 0.01.into(),
+            ..Monochrome::default()
+        });
     });
     assert!(text.contains("light.wavelength_um: 0 is out of range: expected 0.4 to 0.7"), "{text}");
     let text = problems(&|recipe| {
