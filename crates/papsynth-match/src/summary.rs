@@ -163,7 +163,9 @@ impl Summary {
             all.put(format!("fraction above {a}"), Transform::Log(0.002).of(tail(&s.histogram, a)));
         }
         all.put("absorbance of the darkest parts", darkest(&s.histogram));
-        all.put("noise of thin cytoplasm", noise::noise_of_thin_cytoplasm(grey, width, empty));
+        for (i, noise) in (1..).zip(noise::noise_by_darkness(grey, width, empty)) {
+            all.put(format!("noise in the dark, bin {i}"), noise);
+        }
         for (i, texture) in (1..).zip(noise::texture_by_darkness(grey, width, empty)) {
             all.put(format!("texture in the dark, value {i}"), texture);
         }
