@@ -57,7 +57,7 @@ mod tests {
     fn the_light_is_the_mean_over_wavelengths_with_gamma_distributed_absorption() {
         for variation in [0.02_f64, 0.3, 0.7, 1.0] {
             let band = BroadBand::new(variation).unwrap();
-            // Midpoint rule over the gamma density; the substitution k = y^(1/shape) removes its pole at 0.
+            // Midpoint rule over the gamma density, which has no pole at 0 for variations up to 1.
             let shape = 1.0 / (variation * variation);
             let mean_of = |f: &dyn Fn(f64) -> f64| {
                 let (n, most) = (200_000, 1.0 + 12.0 * variation + 18.0 * variation * variation);
