@@ -91,9 +91,9 @@ impl TexturePools {
 ///
 /// In windows of 48 pixels of 0.33 µm in cells of Cervix93, φ measured from the direction of other windows of the same
 /// cells, the power is 1 + a cos 2φ with a of 0.29 to 0.36 at 0.08 to 0.14 cycles per pixel, 0.25 at 0.14 to 0.22, and
-/// 0.05 to 0.08 at 0.22 to 0.32. It includes noise and other structures. In simulated fields, these numbers are 0.27 to
-/// 0.36, 0.27 to 0.32, and 0.09 to 0.11.
-const STREAKS: [[f64; 2]; 2] = [[0.1, 1.2], [0.25, 0.1]];
+/// 0.05 to 0.08 at 0.22 to 0.32. It includes noise and other structures. In matched fields, these numbers are 0.25 to
+/// 0.27, 0.22 to 0.27, and 0.06 to 0.10.
+const STREAKS: [[f64; 2]; 2] = [[0.1, 1.15], [0.25, 0.1]];
 
 /// Frequencies, cycles per texel, between which the phases of a texture become random: wavelengths of 11 to 7 texels.
 ///

@@ -12,7 +12,8 @@ use crate::phantom::texture_pool::{Pool, PoolSampler};
 use crate::phantom::tile::Point;
 use crate::random;
 
-/// The fine texture of a cell: one kind in the ectoplasm, another in the endoplasm, with streaks in the same direction.
+/// The fine texture of a cell: one kind in the ectoplasm, another in the endoplasm, with streaks in about the same
+/// direction.
 pub(super) struct FineTexture<'a> {
     /// Pool and place of both kinds.
     kinds: [(&'a Pool, PoolSampler); 2],
@@ -34,7 +35,10 @@ impl<'a> FineTexture<'a> {
         }
         let relative_um = pixel_um / cell.body.detail.texture_size;
         let direction = direction_at(cell.object.centre_um, cell.scene.key_of(cell.object));
-        let mut kind = |name| pools.pool(name).map(|pool| (pool, pools.sampler(relative_um, direction, &mut rng)));
+        let mut kind = |name| {
+            let own = direction + DEVIATION * random::normal(&mut rng);
+            pools.pool(name).map(|pool| (pool, pools.sampler(relative_um, own, &mut rng)))
+        };
         let [outer, inner_kind] = &cell.body.textures;
         let kinds = [kind(outer)?, kind(inner_kind)?];
         Ok(Some(Self { kinds, inner, rows: Default::default(), strengths }))
@@ -77,6 +81,10 @@ fn mix_textures(outer: &mut [f32], inner: &[f32], fractions: &[f32], [outside, i
 /// cos 2Δ of two windows decreases to 0.8 at 30 µm, 0.55 at 65 µm, 0.35 at 95 µm and 0.15 at 140 µm, relative to
 /// neighbouring windows.
 const DIRECTION_UM: f64 = 75.0;
+
+/// Standard deviation of the direction of the streaks of a part of a cell from that field, radians: the mean of cos 2Δ
+/// decreases from one window to the next ones, at 18 to 30 µm, to 0.65 to 0.8.
+const DEVIATION: f64 = 0.3;
 
 /// Number of plane waves of that field.
 const WAVES: usize = 16;
