@@ -317,6 +317,7 @@ pub(crate) mod tests {
         const WIDTH: usize = 200;
         let pools = TexturePools::new(&crate::model::Model::builtin().cytoplasm_texture.unwrap());
         let mut rng = Key { seed: 5, index: 0 }.stream("test", 0, "streaks");
+        let mut coherences = Vec::new();
         for name in pools.texture.kinds.iter().map(|kind| &kind.name) {
             for direction in [0.0, 0.6, 1.9, 2.8] {
                 let sampler = pools.sampler(0.33, direction, &mut rng);
@@ -332,10 +333,12 @@ pub(crate) mod tests {
                 let [xx, xy, yy] = tensor;
                 let difference = 0.5 * libm::atan2(2.0 * xy, xx - yy) - direction;
                 assert!(libm::cos(2.0 * difference) > 0.9, "{name} {direction}: {difference}");
-                let coherence = libm::hypot(xx - yy, 2.0 * xy) / (xx + yy);
-                assert!((0.1..0.5).contains(&coherence), "{name}: {coherence}");
+                coherences.push(libm::hypot(xx - yy, 2.0 * xy) / (xx + yy));
             }
         }
+        // A window of a pool has an anisotropy of its own of 0.03 to 0.08.
+        let mean = coherences.iter().sum::<f64>() / coherences.len() as f64;
+        assert!((0.12..0.25).contains(&mean), "{coherences:?}");
     }
 
     /// `PAPSYNTH_BLESS=1` rewrites the file.
