@@ -82,12 +82,12 @@ fn mix_textures(outer: &mut [f32], inner: &[f32], fractions: &[f32], [outside, i
 /// neighbouring windows.
 const DIRECTION_UM: f64 = 75.0;
 
-/// Standard deviation of the direction of the streaks of a part of a cell from that field, radians: the mean of cos 2Δ
-/// decreases from one window to the next ones, at 18 to 30 µm, to 0.65 to 0.8.
-const DEVIATION: f64 = 0.3;
-
 /// Number of plane waves of that field.
 const WAVES: usize = 16;
+
+/// Standard deviation of the direction of the streaks of a part of a cell from that of the random field, radians. In
+/// real fields, the mean of cos 2Δ decreases from neighbouring windows to those at 30 µm to 0.65 to 0.8.
+const DEVIATION: f64 = 0.3;
 
 /// Returns the direction across the streaks of cells at a place of an image or plot, radians.
 ///
