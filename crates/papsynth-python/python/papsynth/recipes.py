@@ -495,7 +495,7 @@ class Cytoplasm(Section):
 
     clouds_um: Number | None = None
     """Standard deviation of the smoothing of that noise: two noise fields with 1.2 and 0.6 times this number, each
-    stretched in a direction of its own. From 0.1 to 100 µm.
+    stretched about along the streaks of the fine texture. From 0.1 to 100 µm.
     """
 
     clouds_stretch: Number | None = None

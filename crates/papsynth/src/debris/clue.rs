@@ -6,7 +6,7 @@
 use multiversion::multiversion;
 
 use super::prelude::*;
-use crate::phantom::box_sums::for_each_row_of_sums;
+use crate::phantom::box_sums::averaged;
 use crate::scene::view::FieldNumbers;
 
 section! {
@@ -130,36 +130,4 @@ fn widened(tile: &Tile, place: &Tile) -> Tile {
         row.copy_from_slice(values);
     });
     wide
-}
-
-/// Returns the mean over squares of 2·radius + 1 pixels.
-fn averaged(tile: &Tile, radius: usize) -> Tile {
-    let side = (2 * radius + 1) as f32;
-    let weight = 1.0 / (side * side);
-    let mut values = Vec::with_capacity(tile.values.len());
-    for_each_row_of_sums(tile, radius, |sums| {
-        values.extend(sums.iter().map(|sum| (weight * sum).clamp(0.0, 1.0)));
-    });
-    Tile { values, ..*tile }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn averages_match_sums_over_squares() {
-        let values = (0..13 * 9).map(|i| f32::from(u8::from(i * 7 % 5 < 3))).collect();
-        let tile = Tile { origin: [2, -3], width: 13, values };
-        for radius in [1_usize, 3, 8, 20] {
-            let mean = averaged(&tile, radius);
-            for (i, found) in mean.values.iter().enumerate() {
-                let near = |a: usize, b: usize| a.abs_diff(b) <= radius;
-                let square =
-                    tile.values.iter().enumerate().filter(|(j, _)| near(j % 13, i % 13) && near(j / 13, i / 13));
-                let wanted = square.map(|(_, value)| value).sum::<f32>() / ((2 * radius + 1) * (2 * radius + 1)) as f32;
-                assert!((found - wanted).abs() < 1e-5, "{radius} {i}: {found} {wanted}");
-            }
-        }
-    }
 }

@@ -24,6 +24,17 @@ pub(crate) fn for_each_row_of_sums(tile: &Tile, radius: usize, mut visit: impl F
     }
 }
 
+/// Returns the mean over squares of 2·radius + 1 pixels.
+pub(crate) fn averaged(tile: &Tile, radius: usize) -> Tile {
+    let side = (2 * radius + 1) as f32;
+    let weight = 1.0 / (side * side);
+    let mut values = Vec::with_capacity(tile.values.len());
+    for_each_row_of_sums(tile, radius, |sums| {
+        values.extend(sums.iter().map(|sum| (weight * sum).clamp(0.0, 1.0)));
+    });
+    Tile { values, ..*tile }
+}
+
 /// Sums each window of `side` consecutive values, of which there are `side` − 1 more than sums. `blocks` are buffers.
 fn sum_windows(sums: &mut [f32], values: &[f32], blocks: &mut [Vec<f32>; 2], side: usize) {
     let [blocks, doubled] = blocks;
@@ -72,6 +83,22 @@ mod tests {
             sum_windows(&mut sums, &values, &mut [values.clone(), values.clone()], side);
             let direct: Vec<f32> = values.windows(side).map(|window| window.iter().sum()).collect();
             assert_eq!(sums, direct, "{side}");
+        }
+    }
+
+    #[test]
+    fn averages_match_sums_over_squares() {
+        let values = (0..13 * 9).map(|i| f32::from(u8::from(i * 7 % 5 < 3))).collect();
+        let tile = Tile { origin: [2, -3], width: 13, values };
+        for radius in [1_usize, 3, 8, 20] {
+            let mean = averaged(&tile, radius);
+            for (i, found) in mean.values.iter().enumerate() {
+                let near = |a: usize, b: usize| a.abs_diff(b) <= radius;
+                let square =
+                    tile.values.iter().enumerate().filter(|(j, _)| near(j % 13, i % 13) && near(j / 13, i / 13));
+                let wanted = square.map(|(_, value)| value).sum::<f32>() / ((2 * radius + 1) * (2 * radius + 1)) as f32;
+                assert!((found - wanted).abs() < 1e-5, "{radius} {i}: {found} {wanted}");
+            }
         }
     }
 }

@@ -296,13 +296,13 @@ section! {
         /// Width of a wrinkle: standard deviation of its profile. Rolled stretches of the rim have 0.4 to 0.9 µm.
         wrinkle_um: Number (given f64) = Number::uniform(0.25, 0.8), 0.05..=5, "µm";
         /// Additional thickness of the inner cytoplasm, relative to the rest: 1.4 times this number.
-        endoplasm: Number (given f64) = Number::log_normal(0.4, 0.5).at_most(1.5), 0..=2;
+        endoplasm: Number (given f64) = Number::log_normal(0.3, 0.5).at_most(1.5), 0..=2;
         /// Amplitude of the first level of detail, low-frequency noise, relative to the absorbance of the cytoplasm.
         /// Dark places are smaller and stronger than pale ones.
-        clouds: Number = Number::uniform(0.035, 0.13), 0..=2;
+        clouds: Number = Number::log_normal(0.11, 0.5).at_most(0.4), 0..=2;
         /// Standard deviation of the smoothing of that noise: two noise fields with 1.2 and 0.6 times this number, each
-        /// stretched in a direction of its own.
-        clouds_um: Number = Number::log_normal(4.0, 0.7).at_least(0.7).at_most(14.0), 0.1..=100, "µm";
+        /// stretched about along the streaks of the fine texture.
+        clouds_um: Number = Number::log_normal(2.5, 0.6).at_least(0.7).at_most(14.0), 0.1..=100, "µm";
         /// Length of the clouds relative to their width, with the same area; 1 for round clouds.
         clouds_stretch: Number = Number::log_normal(2.0, 0.5).at_least(1.0).at_most(4.0), 1..=20;
         /// Amplitude of the second level of detail, relative to the absorbance of the cytoplasm: spots, made by

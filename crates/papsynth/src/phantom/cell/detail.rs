@@ -5,13 +5,13 @@ use core::ops::Range;
 use multiversion::multiversion;
 use voronoi_cytoskeleton::{LineParams, draw_into};
 
-use super::fine_texture::FineTexture;
+use super::fine_texture::{FineTexture, streaks_of};
 use crate::error::ErrorKind;
 use crate::key::Stream;
-use crate::phantom::box_sums::{add_row, for_each_row_of_sums};
+use crate::phantom::box_sums::{add_row, averaged, for_each_row_of_sums};
 use crate::phantom::cell_context::CellContext;
 use crate::phantom::noise_fields::{FieldSampler, NoiseField, SIDE, Texels};
-use crate::phantom::parametric_shape::perturbed_circle;
+use crate::phantom::parametric_shape::{make_irregular, perturbed_circle};
 use crate::phantom::tile::{Point, Tile, scaled_about};
 use crate::random;
 use crate::scene::cell::CellDetail;
@@ -73,8 +73,11 @@ const PALEST: f32 = -0.5 / DARKER;
 /// Sizes of the two noise fields of clouds, relative to `clouds_um`. Set by eye.
 const CLOUDS_SIZES: [f64; 2] = [1.2, 0.6];
 
-/// The clouds of a cell: the sum of two noise fields, each stretched in a direction of its own, with variance 1.
-/// Cytoplasm of real cells has strands and folds that cross rather than round clouds.
+/// Standard deviation of the direction of clouds from that of the streaks of the cell, radians.
+const CLOUDS_DEVIATION: f64 = 0.7;
+
+/// The clouds of a cell: the sum of two noise fields, each stretched about along the streaks, with variance 1.
+/// Cytoplasm of real cells has strands and folds rather than round clouds.
 struct Clouds<'a> {
     noise_field: &'a NoiseField,
     samplers: [FieldSampler; 2],
@@ -90,7 +93,8 @@ impl<'a> Clouds<'a> {
         let detail = &cell.body.detail;
         let sizes = CLOUDS_SIZES.map(|size| size * detail.clouds_um / cell.pixel_um());
         let samplers = sizes.map(|sigma_px| {
-            FieldSampler::clouds(sigma_px, rng).stretched(detail.clouds_stretch, random::direction(rng))
+            let along = streaks_of(cell, CLOUDS_DEVIATION, rng) + core::f64::consts::FRAC_PI_2;
+            FieldSampler::clouds(sigma_px, rng).stretched(detail.clouds_stretch, along)
         });
         if detail.clouds <= 0.0 {
             return None;
@@ -295,12 +299,20 @@ impl CoarseTile {
         Self { coarse, line: vec![0.0; width] }
     }
 
-    /// Draws a ramp with wide steps, as [`ramp`].
-    fn ramp(like: &Tile, polygon: &[Point], centre: Point, inner: f64, outer: f64) -> Self {
-        let place = |p: Point| [0, 1].map(|axis| (p[axis] - like.origin[axis] as f64 - FIRST) / COARSE as f64);
-        let polygon: Vec<Point> = polygon.iter().map(|p| place(*p)).collect();
-        let blank = Self::blank(like);
-        Self { coarse: ramp(&blank.coarse, &polygon, place(centre), inner, outer), ..blank }
+    /// Draws the inside of a polygon, smoothed with about a Gaussian of this standard deviation, px: the mean over
+    /// squares, three times.
+    fn smoothed(like: &Tile, polygon: &[Point], sigma_px: f64) -> Self {
+        let place = |p: &Point| [0, 1].map(|axis| (p[axis] - like.origin[axis] as f64 - FIRST) / COARSE as f64);
+        let polygon: Vec<Point> = polygon.iter().map(place).collect();
+        let mut drawn = Self::blank(like);
+        drawn.coarse.cover(&polygon);
+        let sigma = sigma_px / COARSE as f64;
+        // The variance of a square of side s is (s² − 1)/12.
+        let radius = 0.5 * ((4.0 * sigma * sigma + 1.0).sqrt() - 1.0);
+        for more in [0.0, 1.0 / 3.0, -1.0 / 3.0] {
+            drawn.coarse = averaged(&drawn.coarse, random::count((radius + more).max(0.0)));
+        }
+        drawn
     }
 
     /// Samples a noise field.
@@ -363,11 +375,14 @@ pub(super) fn add_endoplasm(
         return None;
     }
     let (pixel_um, rng) = (cell.pixel_um(), &mut cell.stream("endoplasm"));
-    let size = random::between(0.45, 0.75, rng);
-    let softness = random::between(0.08, 0.3, rng);
-    // The ramp is wide, so that every second point is sufficient.
-    let coarse_outline: Vec<Point> = outline.iter().step_by(2).copied().collect();
-    let mut ramp_of_zone = CoarseTile::ramp(absorbance, &coarse_outline, nucleus, size - softness, size + softness);
+    let size = random::between(SIZE[0], SIZE[1], rng);
+    let sigma_px = random::between(SOFTNESS[0], SOFTNESS[1], rng) * body.radius_um / pixel_um;
+    // The zone is smooth, so that every second point is sufficient.
+    let around = outline.iter().step_by(2).map(|p| [0, 1].map(|axis| size * (p[axis] - nucleus[axis])));
+    let mut zone: Vec<Point> = around.collect();
+    make_irregular(&mut zone, IRREGULARITY, rng);
+    let zone: Vec<Point> = zone.iter().map(|p| [p[0] + nucleus[0], p[1] + nucleus[1]]).collect();
+    let mut inner = CoarseTile::smoothed(absorbance, &zone, sigma_px);
     // Densest where the nucleus lifts the sheet.
     let radius = body.nucleus.radius_um / pixel_um;
     let round = perturbed_circle(radius, 0.15, 0.15, rng);
@@ -379,13 +394,22 @@ pub(super) fn add_endoplasm(
         values.iter_mut().zip(ramp).for_each(|(value, ramp)| *value *= 1.0 + lift * ramp);
     });
     let density = body.detail.endoplasm as f32;
-    let mut zone = vec![0.0_f32; absorbance.width];
-    for (y, row) in absorbance.values.chunks_exact_mut(zone.len()).enumerate() {
-        ramp_of_zone.row_into(&mut zone, y);
-        thicken(row, &zone, INNER * density);
+    let mut inside = vec![0.0_f32; absorbance.width];
+    for (y, row) in absorbance.values.chunks_exact_mut(inside.len()).enumerate() {
+        inner.row_into(&mut inside, y);
+        thicken(row, &inside, INNER * density);
     }
-    Some(ramp_of_zone)
+    Some(inner)
 }
+
+/// Size of the zone of the endoplasm relative to the cell: minimum, maximum.
+const SIZE: [f64; 2] = [0.45, 0.75];
+
+/// Standard deviation of the Gaussian that smooths the zone, relative to the radius of the cell: minimum, maximum.
+const SOFTNESS: [f64; 2] = [0.1, 0.3];
+
+/// Irregularity of the outline of the zone: see [`make_irregular`].
+const IRREGULARITY: f64 = 0.12;
 
 /// Increase of thickness in the endoplasm relative to its density. In fields with the default endoplasm, matched to
 /// normal fields of Cervix93, the absorbance of single cells relative to its median, which includes the endoplasm,
@@ -483,21 +507,22 @@ mod tests {
     }
 
     #[test]
-    fn a_coarse_ramp_is_close_to_the_ramp() {
-        for (origin, width, height) in [([-20, -20], 41, 42), ([-17, -23], 43, 47), ([-18, -22], 44, 45)] {
-            let like = Tile { origin, width, values: vec![0.0; width * height] };
-            let (polygon, centre) = (disc([1.0, 0.5], 14.0), [0.3, 0.2]);
-            let exact = ramp(&like, &polygon, centre, 0.2, 1.4);
-            let mut coarse = CoarseTile::ramp(&like, &polygon, centre, 0.2, 1.4);
+    fn a_smoothed_half_plane_is_the_normal_distribution_function() {
+        for (origin, width, sigma) in [([-20, -20], 161, 12.0), ([-17, -23], 243, 20.0), ([5, 6], 242, 33.0)] {
+            let like = Tile { origin, width, values: vec![0.0; width * 301] };
+            let [left, top] = origin.map(|o| o as f64);
+            let edge = left + 0.5 * width as f64;
+            let half = [[left - 9.0, top - 9.0], [edge, top - 9.0], [edge, top + 400.0], [left - 9.0, top + 400.0]];
+            let mut zone = CoarseTile::smoothed(&like, &half, sigma);
             let mut row = vec![0.0; width];
-            let mut errors: Vec<f64> = Vec::new();
-            for (y, exact) in exact.values.chunks_exact(width).enumerate() {
-                coarse.row_into(&mut row, y);
-                errors.extend(exact.iter().zip(&row).map(|(a, b)| f64::from(a - b)));
+            zone.row_into(&mut row, 150);
+            let middle = width / 4..3 * width / 4;
+            for (x, found) in row.iter().enumerate().take(middle.end).skip(middle.start) {
+                let distance = (edge - left - x as f64) / sigma;
+                let wanted = 0.5 * libm::erfc(-distance * core::f64::consts::FRAC_1_SQRT_2);
+                assert!((f64::from(*found) - wanted).abs() < 0.03, "{sigma} {x}: {found} {wanted}");
             }
-            let mean = errors.iter().sum::<f64>() / errors.len() as f64;
-            // A step of the ramp is 1/6.
-            assert!(errors.iter().all(|error| error.abs() < 0.12) && mean.abs() < 0.01, "{mean} {errors:?}");
+            assert!(row[middle].windows(2).all(|pair| pair[1] <= pair[0] + 1e-5));
         }
     }
 

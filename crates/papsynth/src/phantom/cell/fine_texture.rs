@@ -6,7 +6,7 @@ use multiversion::multiversion;
 
 use super::detail::CoarseTile;
 use crate::error::ErrorKind;
-use crate::key::Key;
+use crate::key::{Key, Stream};
 use crate::phantom::cell_context::CellContext;
 use crate::phantom::texture_pool::{Pool, PoolSampler};
 use crate::phantom::tile::Point;
@@ -34,10 +34,9 @@ impl<'a> FineTexture<'a> {
             return Ok(None);
         }
         let relative_um = pixel_um / cell.body.detail.texture_size;
-        let direction = direction_at(cell.object.centre_um, cell.scene.key_of(cell.object));
         let mut kind = |name| {
-            let own = direction + DEVIATION * random::normal(&mut rng);
-            pools.pool(name).map(|pool| (pool, pools.sampler(relative_um, own, &mut rng)))
+            let across = streaks_of(cell, DEVIATION, &mut rng);
+            pools.pool(name).map(|pool| (pool, pools.sampler(relative_um, across, &mut rng)))
         };
         let [outer, inner_kind] = &cell.body.textures;
         let kinds = [kind(outer)?, kind(inner_kind)?];
@@ -88,6 +87,12 @@ const WAVES: usize = 16;
 /// Standard deviation of the direction of the streaks of a part of a cell from that of the random field, radians. In
 /// real fields, the mean of cos 2Δ decreases from neighbouring windows to those at 30 µm to 0.65 to 0.8.
 const DEVIATION: f64 = 0.3;
+
+/// Draws the direction across the streaks of a part of a cell, radians, with this standard deviation from the
+/// direction of the slide there.
+pub(super) fn streaks_of(cell: &CellContext<'_>, deviation: f64, rng: &mut Stream) -> f64 {
+    direction_at(cell.object.centre_um, cell.scene.key_of(cell.object)) + deviation * random::normal(rng)
+}
 
 /// Returns the direction across the streaks of cells at a place of an image or plot, radians.
 ///

@@ -6,6 +6,7 @@ mod segment;
 pub(super) use segment::LANES;
 use segment::{PLEAT, RIDGE, SLOPE_WIDTH, Segment, add_and_clear, paint};
 
+use super::fine_texture::streaks_of;
 use crate::key::Stream;
 use crate::phantom::cell_context::CellContext;
 use crate::phantom::tile::{Point, Tile};
@@ -69,6 +70,9 @@ const END_WIDTH: f64 = 0.4;
 /// Fraction of a wrinkle's length over which it rises or fades.
 const TAPER: f64 = 0.3;
 
+/// Standard deviation of the direction of wrinkles across a cell from that of its streaks, radians. Set by eye.
+const DEVIATION: f64 = 0.5;
+
 /// A wrinkle before it is drawn.
 struct Wrinkle {
     path: Vec<Point>,
@@ -113,7 +117,7 @@ impl Wrinkles {
                 let stem = &others[random::below(others.len(), rng)];
                 forked(&stem.path, outline, step, rng)
             } else {
-                across(outline, step, rng)
+                across(outline, step, cell, rng)
             };
             let kind = if rolled {
                 WrinkleKind { width_um: ROLLED_UM, thickness: ROLLED_THICKNESS, pleat: false }
@@ -276,13 +280,15 @@ fn mean_near(line: &[Point], index: usize, reach: usize) -> Point {
     sum.map(|sum| sum / (2 * reach + 1) as f64)
 }
 
-/// Draws a curved path from a random point.
-fn across(outline: &[Point], step: f64, rng: &mut Stream) -> Vec<Point> {
+/// Draws a curved path from a random point, about along the streaks of the cell.
+fn across(outline: &[Point], step: f64, cell: &CellContext<'_>, rng: &mut Stream) -> Vec<Point> {
     let middle = fsd_shape::centroid(outline);
     let rim = outline[random::below(outline.len(), rng)];
     let t = 0.2 + 0.75 * random::uniform(rng).sqrt();
     let start = [middle[0] + t * (rim[0] - middle[0]), middle[1] + t * (rim[1] - middle[1])];
-    curved_path(start, random::direction(rng), radius_of(outline), step, rng)
+    let turned = if random::chance(0.5, rng) { 0.5 } else { -0.5 };
+    let along = streaks_of(cell, DEVIATION, rng) + turned * core::f64::consts::PI;
+    curved_path(start, along, radius_of(outline), step, rng)
 }
 
 /// Draws a curved path that leaves another one at an acute angle.
@@ -300,8 +306,8 @@ fn radius_of(outline: &[Point]) -> f64 {
 /// Draws a path of slowly changing curvature.
 fn curved_path(start: Point, direction: f64, radius: f64, step: f64, rng: &mut Stream) -> Vec<Point> {
     let steps = random::count(random::between(0.4, 1.7, rng) * radius / step).max(4);
-    let mean = random::normal(rng) * 0.8 / radius;
-    let mut curvature = Autoregression::new(2.0 / radius, rng);
+    let mean = random::normal(rng) * 0.4 / radius;
+    let mut curvature = Autoregression::new(1.2 / radius, rng);
     let (mut at, mut heading) = (start, direction);
     (0..steps)
         .map(|_| {
