@@ -14,6 +14,8 @@ pub(super) struct CellContext<'a> {
     pub(super) noise_fields: &'a NoiseFields<'a>,
     pub(super) object: &'a Object,
     pub(super) body: &'a CellBody,
+    /// Direction across the streaks of cells at the place of this one, radians.
+    pub(super) streaks: f64,
 }
 
 impl CellContext<'_> {

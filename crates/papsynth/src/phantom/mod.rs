@@ -15,6 +15,7 @@ mod nucleus;
 pub(crate) mod parametric_shape;
 mod phantom_scene;
 pub(crate) mod piece;
+mod streaks;
 mod texture_pool;
 pub(crate) mod tile;
 
@@ -39,7 +40,10 @@ pub(crate) fn make<'a>(
     objects: &[&'a Object],
 ) -> Result<Vec<Phantom>, ErrorKind> {
     let cell = |object: &&'a Object| match &object.body {
-        Body::Cell(body) => Some(CellContext { assets, scene, noise_fields, object, body }),
+        Body::Cell(body) => {
+            let streaks = streaks::direction_at(object.centre_um, scene.key_of(object));
+            Some(CellContext { assets, scene, noise_fields, object, body, streaks })
+        }
         _ => None,
     };
     let cells: Vec<CellContext<'_>> = objects.iter().filter_map(cell).collect();

@@ -5,7 +5,7 @@ use core::ops::Range;
 use multiversion::multiversion;
 use voronoi_cytoskeleton::{LineParams, draw_into};
 
-use super::fine_texture::{FineTexture, streaks_of};
+use super::fine_texture::FineTexture;
 use crate::error::ErrorKind;
 use crate::key::Stream;
 use crate::phantom::box_sums::{add_row, averaged, for_each_row_of_sums};
@@ -93,7 +93,7 @@ impl<'a> Clouds<'a> {
         let detail = &cell.body.detail;
         let sizes = CLOUDS_SIZES.map(|size| size * detail.clouds_um / cell.pixel_um());
         let samplers = sizes.map(|sigma_px| {
-            let along = streaks_of(cell, CLOUDS_DEVIATION, rng) + core::f64::consts::FRAC_PI_2;
+            let along = cell.streaks + CLOUDS_DEVIATION * random::normal(rng) + core::f64::consts::FRAC_PI_2;
             FieldSampler::clouds(sigma_px, rng).stretched(detail.clouds_stretch, along)
         });
         if detail.clouds <= 0.0 {
@@ -375,12 +375,12 @@ pub(super) fn add_endoplasm(
         return None;
     }
     let (pixel_um, rng) = (cell.pixel_um(), &mut cell.stream("endoplasm"));
-    let size = random::between(SIZE[0], SIZE[1], rng);
-    let sigma_px = random::between(SOFTNESS[0], SOFTNESS[1], rng) * body.radius_um / pixel_um;
+    let size = random::between(INNER_SIZE[0], INNER_SIZE[1], rng);
+    let sigma_px = random::between(INNER_SOFTNESS[0], INNER_SOFTNESS[1], rng) * body.radius_um / pixel_um;
     // The zone is smooth, so that every second point is sufficient.
     let around = outline.iter().step_by(2).map(|p| [0, 1].map(|axis| size * (p[axis] - nucleus[axis])));
     let mut zone: Vec<Point> = around.collect();
-    make_irregular(&mut zone, IRREGULARITY, rng);
+    make_irregular(&mut zone, INNER_IRREGULARITY, rng);
     let zone: Vec<Point> = zone.iter().map(|p| [p[0] + nucleus[0], p[1] + nucleus[1]]).collect();
     let mut inner = CoarseTile::smoothed(absorbance, &zone, sigma_px);
     // Densest where the nucleus lifts the sheet.
@@ -403,13 +403,13 @@ pub(super) fn add_endoplasm(
 }
 
 /// Size of the zone of the endoplasm relative to the cell: minimum, maximum.
-const SIZE: [f64; 2] = [0.45, 0.75];
+const INNER_SIZE: [f64; 2] = [0.45, 0.75];
 
 /// Standard deviation of the Gaussian that smooths the zone, relative to the radius of the cell: minimum, maximum.
-const SOFTNESS: [f64; 2] = [0.1, 0.3];
+const INNER_SOFTNESS: [f64; 2] = [0.1, 0.3];
 
 /// Irregularity of the outline of the zone: see [`make_irregular`].
-const IRREGULARITY: f64 = 0.12;
+const INNER_IRREGULARITY: f64 = 0.12;
 
 /// Increase of thickness in the endoplasm relative to its density. In fields with the default endoplasm, matched to
 /// normal fields of Cervix93, the absorbance of single cells relative to its median, which includes the endoplasm,

@@ -6,7 +6,6 @@ mod segment;
 pub(super) use segment::LANES;
 use segment::{PLEAT, RIDGE, SLOPE_WIDTH, Segment, add_and_clear, paint};
 
-use super::fine_texture::streaks_of;
 use crate::key::Stream;
 use crate::phantom::cell_context::CellContext;
 use crate::phantom::tile::{Point, Tile};
@@ -117,7 +116,7 @@ impl Wrinkles {
                 let stem = &others[random::below(others.len(), rng)];
                 forked(&stem.path, outline, step, rng)
             } else {
-                across(outline, step, cell, rng)
+                across(outline, step, cell.streaks, rng)
             };
             let kind = if rolled {
                 WrinkleKind { width_um: ROLLED_UM, thickness: ROLLED_THICKNESS, pleat: false }
@@ -280,14 +279,14 @@ fn mean_near(line: &[Point], index: usize, reach: usize) -> Point {
     sum.map(|sum| sum / (2 * reach + 1) as f64)
 }
 
-/// Draws a curved path from a random point, about along the streaks of the cell.
-fn across(outline: &[Point], step: f64, cell: &CellContext<'_>, rng: &mut Stream) -> Vec<Point> {
+/// Draws a curved path from a random point. `streaks` is the direction across the streaks of the cell.
+fn across(outline: &[Point], step: f64, streaks: f64, rng: &mut Stream) -> Vec<Point> {
     let middle = fsd_shape::centroid(outline);
     let rim = outline[random::below(outline.len(), rng)];
     let t = 0.2 + 0.75 * random::uniform(rng).sqrt();
     let start = [middle[0] + t * (rim[0] - middle[0]), middle[1] + t * (rim[1] - middle[1])];
     let turned = if random::chance(0.5, rng) { 0.5 } else { -0.5 };
-    let along = streaks_of(cell, DEVIATION, rng) + turned * core::f64::consts::PI;
+    let along = streaks + DEVIATION * random::normal(rng) + turned * core::f64::consts::PI;
     curved_path(start, along, radius_of(outline), step, rng)
 }
 
