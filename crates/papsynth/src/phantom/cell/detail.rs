@@ -74,6 +74,9 @@ const PALEST: f32 = -0.5 / DARKER;
 const CLOUDS_SIZES: [f64; 2] = [1.2, 0.6];
 
 /// Standard deviation of the direction of clouds from that of the streaks of the cell, radians.
+///
+/// In single normal cells of Cervix93, gradients of details of 2 to 4 µm have a coherence of 0.19 (median). With 0.3
+/// radians it is 0.26 in simulated ones, with this number 0.19.
 const CLOUDS_DEVIATION: f64 = 0.7;
 
 /// The clouds of a cell: the sum of two noise fields, each stretched about along the streaks, with variance 1.
@@ -402,7 +405,7 @@ pub(super) fn add_endoplasm(
     Some(inner)
 }
 
-/// Size of the zone of the endoplasm relative to the cell: minimum, maximum.
+/// Size of the zone of the endoplasm relative to the cell: minimum, maximum. This and the next two were set by eye.
 const INNER_SIZE: [f64; 2] = [0.45, 0.75];
 
 /// Standard deviation of the Gaussian that smooths the zone, relative to the radius of the cell: minimum, maximum.
