@@ -130,8 +130,9 @@ parameters! {
     Pyknotic: Simulated, Field, Linear 0.0..0.3 "", "nucleus.pyknotic";
     /// Width of the border in which cells become thin.
     CellEdge: Simulated, Field, Logarithmic 0.8..8.0 "um", "cytoplasm.rim_um";
-    /// Strength of the structures of the cytoplasm, relative to the initial recipe.
-    Structure: Simulated, Field, Logarithmic 0.2..3.0 "", "cytoplasm.clouds, flecks, cytoskeleton: factor";
+    /// Specks and spots of the cytoplasm, relative to the initial recipe. The strengths of clouds and of the
+    /// cytoskeleton change by its root.
+    Structure: Simulated, Field, Logarithmic 0.1..6.0 "", "cytoplasm.specks, flecks: factor; clouds, cytoskeleton: root";
     /// Strength of the fine texture of the cytoplasm, relative to the initial recipe.
     FineTexture: Simulated, Field, Logarithmic 0.1..6.0 "", "cytoplasm.texture: factor";
     /// Number of cells.

@@ -171,7 +171,9 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
 
     if on(P::Level) {
         let level = get(P::Level) + TEXTURE_LOSS * or_base(P::BackgroundTexture);
-        r.background.level = cut(normal(level, sd(P::Level)), 0.05, 1.1);
+        // In real images, the empty slide of a bright field just reaches the highest grey level.
+        let highest = rounded(P::Level.prior().high + TEXTURE_LOSS * or_base(P::BackgroundTexture));
+        r.background.level = cut(normal(level, sd(P::Level)), 0.05, highest);
     }
     if on(P::FalloffX) || on(P::FalloffY) {
         let centre_offset = match &r.background.illumination {
@@ -211,9 +213,13 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
     if on(P::Structure) {
         let factor = get(P::Structure);
         let cytoplasm = &mut r.cytoplasm;
-        for (number, most) in
-            [(&mut cytoplasm.clouds, 2.0), (&mut cytoplasm.flecks, 5.0), (&mut cytoplasm.cytoskeleton, 2.0)]
-        {
+        // In fields with much structure, cells have more dark specks rather than much stronger clouds.
+        for (number, factor, most) in [
+            (&mut cytoplasm.specks, factor, 1000.0),
+            (&mut cytoplasm.flecks, factor, 5.0),
+            (&mut cytoplasm.clouds, factor.sqrt(), 2.0),
+            (&mut cytoplasm.cytoskeleton, factor.sqrt(), 2.0),
+        ] {
             *number = cut(times(number, factor), 0.0, most);
         }
     }

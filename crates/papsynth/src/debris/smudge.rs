@@ -100,7 +100,7 @@ const PARTS: usize = 4;
 /// Standard deviation of the curvature of a shred: displacement at its ends relative to its half length.
 const BEND: f64 = 0.25;
 /// Standard deviation of the directions of fibres, radians.
-const FAN: f64 = 0.4;
+const FAN: f64 = 0.3;
 
 impl Smudge {
     /// Returns the clump with other values; those outside the limits move towards them, but not beyond.
@@ -167,8 +167,8 @@ impl Smudge {
         let count = random::count((2.0 * b / FIBRE_DISTANCE_UM).clamp(FIBRES[0], FIBRES[1]));
         let fibres: Vec<(Vec<Point>, f64)> = (0..count)
             .map(|_| {
-                let (from, across) = (0.35 * a * random::normal(rng), b * random::between(-1.0, 1.0, rng));
-                let (half, fan) = (a * random::between(0.2, 0.8, rng), FAN * random::normal(rng));
+                let (from, across) = (0.3 * a * random::normal(rng), b * random::between(-1.0, 1.0, rng));
+                let (half, fan) = (a * random::between(0.15, 0.5, rng), FAN * random::normal(rng));
                 let points = (0..=PARTS).map(|i| {
                     let along = half * (2.0 * i as f64 / PARTS as f64 - 1.0);
                     let x = (from + along).clamp(-1.2 * a, 1.2 * a);

@@ -184,6 +184,13 @@ const AMPLITUDE: f64 = 0.37;
 /// Amplitude of the roughness of a scale below a micrometre, relative to that of a few micrometres.
 const FINE_SCALE: f64 = 0.75;
 
+/// Standard deviation of the sum of both.
+const BOTH_SCALES: f64 = 1.25;
+
+/// Weight of the square of the roughness: tips are more pointed than bays. In single cells, the skewness of
+/// displacements between outlines smoothed by 0.5 and 1 µm is 0.4 in real normal cells, and was 0.2 without it.
+const POINTED: f64 = 0.25;
+
 /// Standard deviation of the logarithm of the roughness along a rim: parts of it are smooth and others torn.
 const UNEVENNESS: f64 = 0.7;
 
@@ -203,6 +210,8 @@ pub(super) fn roughened(
     let fine = fsd_shape::resample_along(outline, count);
     // First-order autoregressions: the slow one modulates the amplitude of the others.
     let [mut slow, mut fast, mut medium] = [(); 3].map(|()| random::normal(rng));
+    // Outwards is on the left of a path of positive area, where y points down.
+    let outwards = 1.0_f64.copysign(fsd_shape::signed_area(outline));
     let step = |state: f64, memory: f64, rng: &mut Stream| {
         memory * state + (1.0 - memory * memory).sqrt() * random::normal(rng)
     };
@@ -216,7 +225,9 @@ pub(super) fn roughened(
             let length = (tx * tx + ty * ty).sqrt().max(1e-9);
             let factor = libm::exp(UNEVENNESS * slow - 0.5 * UNEVENNESS * UNEVENNESS);
             let amplitude = AMPLITUDE * factor * roughness(here);
-            let push = depth_px * (amplitude * (FINE_SCALE * fast + medium)).clamp(-2.5, 2.5);
+            let rough = (FINE_SCALE * fast + medium) / BOTH_SCALES;
+            let pointed = (rough + POINTED * (rough * rough - 1.0)) / (1.0 + 2.0 * POINTED * POINTED).sqrt();
+            let push = outwards * depth_px * (BOTH_SCALES * amplitude * pointed).clamp(-2.5, 2.5);
             [here[0] + push * ty / length, here[1] - push * tx / length]
         })
         .collect()
@@ -249,5 +260,28 @@ mod tests {
         assert!(largest < 0.5, "{largest}");
         let mut rng = Key { seed: 1, index: 0 }.stream("test", 0, "waves");
         assert_eq!(wavy(circle.clone(), 0.0, 0.25, &mut rng), circle);
+    }
+
+    #[test]
+    fn roughness_is_skewed_outwards_in_both_orientations() {
+        for sign in [1.0, -1.0] {
+            let circle: Vec<Point> = (0..720)
+                .map(|i| sign * core::f64::consts::TAU * f64::from(i) / 720.0)
+                .map(|angle| [100.0 * libm::cos(angle), 100.0 * libm::sin(angle)])
+                .collect();
+            let (mut squares, mut cubes) = (Vec::new(), Vec::new());
+            for index in 0..40 {
+                let mut rng = Key { seed: 1, index }.stream("test", 0, "roughness");
+                let rough = roughened(&circle, 2.0, 1.0, |_| 1.0, &mut rng);
+                let off: Vec<f64> = rough.iter().map(|p| libm::hypot(p[0], p[1]) - 100.0).collect();
+                let mean = off.iter().sum::<f64>() / off.len() as f64;
+                squares.extend(off.iter().map(|off| (off - mean) * (off - mean)));
+                cubes.extend(off.iter().map(|off| (off - mean) * (off - mean) * (off - mean)));
+            }
+            let [square, cube] = [squares, cubes].map(|values| values.iter().sum::<f64>() / values.len() as f64);
+            // The skewness of x + x²/4 is 1.3 for a normal x; the uneven amplitude of the roughness increases it.
+            let skewness = cube / square.powf(1.5);
+            assert!((1.0..2.5).contains(&skewness), "{skewness}");
+        }
     }
 }

@@ -47,13 +47,13 @@ const FORKED: f64 = 0.35;
 
 /// Fraction of the other wrinkles that are pleats, if they are not bundles: two dark lines with a paler band between,
 /// instead of ridges. This and the next two numbers were set by eye, beside cells of real fields.
-const PLEATS: f64 = 0.2;
+const PLEATS: f64 = 0.08;
 /// Width of a pleat relative to that of a ridge: minimum, maximum.
 const PLEAT_WIDTH: [f64; 2] = [0.8, 2.5];
 /// Fraction of wrinkles that are a bundle of fine ridges side by side, instead of one ridge or pleat: of those that
 /// follow the rim, and of others, rolled stretches of the rim included. These numbers and those of the next four
 /// constants were set by eye, beside cells of real fields.
-const BUNDLED: [f64; 2] = [0.2, 0.35];
+const BUNDLED: [f64; 2] = [0.1, 0.35];
 /// Number of ridges beside the first one of a bundle: minimum, and range above it.
 const BESIDE: [usize; 2] = [1, 3];
 /// Distance between the ridges of a bundle, µm: minimum, maximum.
@@ -66,11 +66,14 @@ const FAINTER: [f64; 2] = [0.25, 0.9];
 /// Width of a wrinkle at its ends relative to its middle.
 const END_WIDTH: f64 = 0.4;
 
-/// Fraction of a wrinkle's length over which it rises or fades.
+/// Largest fraction of a wrinkle's length over which it rises. It fades over at most the rest.
 const TAPER: f64 = 0.3;
 
 /// Standard deviation of the direction of wrinkles across a cell from that of its streaks, radians. Set by eye.
 const DEVIATION: f64 = 0.5;
+
+/// Where wrinkles across a cell begin: distance from the middle relative to that of the rim.
+const NEAR_RIM: f64 = 0.97;
 
 /// A wrinkle before it is drawn.
 struct Wrinkle {
@@ -111,7 +114,7 @@ impl Wrinkles {
             } else if follows_rim {
                 // Most wrinkles are near the rim, where a thin sheet folds freely.
                 let depth = random::uniform(rng);
-                along_rim(outline, &rim, 0.015 + 0.35 * depth * depth, random::between(-0.3, 0.3, rng), rng)
+                along_rim(outline, &rim, 0.015 + 0.25 * depth * depth, random::between(-0.3, 0.3, rng), rng)
             } else if !others.is_empty() && random::chance(FORKED, rng) {
                 let stem = &others[random::below(others.len(), rng)];
                 forked(&stem.path, outline, step, rng)
@@ -279,14 +282,14 @@ fn mean_near(line: &[Point], index: usize, reach: usize) -> Point {
     sum.map(|sum| sum / (2 * reach + 1) as f64)
 }
 
-/// Draws a curved path from a random point. `streaks` is the direction across the streaks of the cell.
+/// Draws a curved path from the rim into the cell. `streaks` is the direction across the streaks of the cell.
 fn across(outline: &[Point], step: f64, streaks: f64, rng: &mut Stream) -> Vec<Point> {
     let middle = fsd_shape::centroid(outline);
     let rim = outline[random::below(outline.len(), rng)];
-    let t = 0.2 + 0.75 * random::uniform(rng).sqrt();
-    let start = [middle[0] + t * (rim[0] - middle[0]), middle[1] + t * (rim[1] - middle[1])];
-    let turned = if random::chance(0.5, rng) { 0.5 } else { -0.5 };
-    let along = streaks + DEVIATION * random::normal(rng) + turned * core::f64::consts::PI;
+    let start = [0, 1].map(|axis| middle[axis] + NEAR_RIM * (rim[axis] - middle[axis]));
+    let along = streaks + DEVIATION * random::normal(rng) + 0.5 * core::f64::consts::PI;
+    let inwards = libm::cos(along) * (middle[0] - rim[0]) + libm::sin(along) * (middle[1] - rim[1]) >= 0.0;
+    let along = if inwards { along } else { along + core::f64::consts::PI };
     curved_path(start, along, radius_of(outline), step, rng)
 }
 
@@ -388,7 +391,7 @@ impl WrinkleProfile {
             strength: cell.body.detail.wrinkle_thickness * thickness * of_width(factor * width_um),
             side: if random::chance(0.5, rng) { 1.0 } else { -1.0 },
             rise: random::between(0.05, TAPER, rng),
-            fall: random::between(0.1, 2.0 * TAPER, rng),
+            fall: random::between(0.2, 1.0 - TAPER, rng),
             factors: random_factors(points, rng),
         }
     }
