@@ -171,7 +171,7 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
 
     if on(P::Level) {
         let level = get(P::Level) + TEXTURE_LOSS * or_base(P::BackgroundTexture);
-        // In real images, the empty slide of a bright field just reaches the highest grey level.
+        // The mean of the empty slide is at most the highest grey level. Brighter fields would have no noise.
         let highest = rounded(P::Level.prior().high + TEXTURE_LOSS * or_base(P::BackgroundTexture));
         r.background.level = cut(normal(level, sd(P::Level)), 0.05, highest);
     }

@@ -72,7 +72,7 @@ const TAPER: f64 = 0.3;
 /// Standard deviation of the direction of wrinkles across a cell from that of its streaks, radians. Set by eye.
 const DEVIATION: f64 = 0.5;
 
-/// Where wrinkles across a cell begin: distance from the middle relative to that of the rim.
+/// Where wrinkles across a cell begin: distance from the middle relative to that of the rim. Set by eye.
 const NEAR_RIM: f64 = 0.97;
 
 /// A wrinkle before it is drawn.
