@@ -539,6 +539,32 @@ mod tests {
     }
 
     #[test]
+    fn the_light_of_no_field_exceeds_the_highest_grey_level() {
+        let mut values = Values::at(&[0.5; PARAMETERS.len()]);
+        values.set(P::Level, P::Level.prior().high);
+        values.set_spread(P::Level, 0.2);
+        let made = recipe(&setting(true), &values, |_| true);
+        let brightest = made.background.level.bounds()[1] - TEXTURE_LOSS * centre(&made.background.texture);
+        assert!((brightest - 1.0).abs() < 1e-3, "{brightest}");
+    }
+
+    #[test]
+    fn structure_changes_specks_more_than_clouds() {
+        let setting = setting(true);
+        let mut values = setting.base_values();
+        values.set(P::Structure, 4.0);
+        let (base, made) = (&setting.base.cytoplasm, recipe(&setting, &values, |_| true).cytoplasm);
+        for (before, after, factor) in [
+            (&base.specks, &made.specks, 4.0),
+            (&base.flecks, &made.flecks, 4.0),
+            (&base.clouds, &made.clouds, 2.0),
+            (&base.cytoskeleton, &made.cytoskeleton, 2.0),
+        ] {
+            assert!((centre(after) / centre(before) - factor).abs() < 0.01 * factor, "{before:?}: {after:?}");
+        }
+    }
+
+    #[test]
     fn values_of_a_recipe_are_read_back() {
         let mut setting = setting(true);
         // A recipe without degenerated cells keeps them out.
