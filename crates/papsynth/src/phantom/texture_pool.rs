@@ -41,11 +41,26 @@ pub(crate) struct Pool {
 /// The place and direction at which a cell reads a pool.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PoolSampler {
+    /// Position of the centre, texels of the pool and px of the tile.
     origin: Point,
+    centre: Point,
     /// Texels per pixel along a row.
     along: Point,
     /// Texels per pixel down a column.
     down: Point,
+    /// Curvature of the streaks, 1/px.
+    bend: f64,
+}
+
+/// The streaks of a part of a cell.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Streaks {
+    /// Direction across the streaks at the centre, radians.
+    pub(crate) across: f64,
+    /// Change of the direction along the streaks, radians per px.
+    pub(crate) bend: f64,
+    /// The centre, px of the tile.
+    pub(crate) centre: Point,
 }
 
 impl TexturePools {
@@ -75,14 +90,15 @@ impl TexturePools {
         Ok(self.pools[index].get_or_init(|| Pool::new(&texels)))
     }
 
-    /// Draws a place and a mirroring. `direction` is that across the streaks of the texture, radians. `pixel_um` is the
-    /// size of the pixels that are drawn, relative to that of the texture.
-    pub(crate) fn sampler<R: Rng + ?Sized>(&self, pixel_um: f64, direction: f64, rng: &mut R) -> PoolSampler {
+    /// Draws a place and a mirroring. `pixel_um` is the size of the pixels that are drawn, relative to that of the
+    /// texture.
+    pub(crate) fn sampler<R: Rng + ?Sized>(&self, pixel_um: f64, streaks: Streaks, rng: &mut R) -> PoolSampler {
+        let Streaks { across, bend, centre } = streaks;
         let step = pixel_um / self.texture.pixel_um;
         let mirror = if random::chance(0.5, rng) { -step } else { step };
         let origin = [0, 1].map(|_| random::between(0.0, SIDE as f64, rng));
-        let (sin, cos) = (libm::sin(direction), libm::cos(direction));
-        PoolSampler { origin, along: [step * cos, -mirror * sin], down: [step * sin, mirror * cos] }
+        let (sin, cos) = (libm::sin(across), libm::cos(across));
+        PoolSampler { origin, centre, along: [step * cos, -mirror * sin], down: [step * sin, mirror * cos], bend }
     }
 }
 
@@ -228,20 +244,32 @@ impl Pool {
     }
 
     /// Writes the texture at a row of pixels that starts at `first`, by bilinear interpolation.
+    ///
+    /// Streaks bend: at v px along them from the centre, the texture is displaced by ½ · bend · v² px across them.
     pub(crate) fn row_into(&self, row: &mut [f32], sampler: &PoolSampler, first: Point) {
-        let PoolSampler { origin, along, down } = sampler;
-        let mut position = [0, 1].map(|axis| fixed(origin[axis] + first[0] * along[axis] + first[1] * down[axis]));
-        let step = along.map(fixed);
+        let PoolSampler { origin, centre, along, down, bend } = sampler;
+        let at = [0, 1].map(|axis| first[axis] - centre[axis]);
+        let mut position = [0, 1].map(|axis| origin[axis] + at[0] * along[axis] + at[1] * down[axis]);
+        // The coordinate v at the first pixel and its change along the row, and the differences of the displacement.
+        let texels = libm::hypot(along[0], down[0]);
+        let [sin, cos] = [down[0] / texels, along[0] / texels];
+        let v = at[1] * cos - at[0] * sin;
+        position[0] += 0.5 * bend * texels * v * v;
+        let mut position = position.map(fixed);
+        let mut step = along.map(fixed);
+        step[0] = step[0].wrapping_add(fixed(bend * texels * sin * (0.5 * sin - v)));
+        let change = fixed(bend * texels * sin * sin);
         for value in row {
             let [x, y] = position;
-            let texel = self.texels[(y >> 16) as usize % SIDE * SIDE + (x >> 16) as usize % SIDE];
-            let [a, b, c, d] = texel.map(f32::from);
-            let [u, v] = position.map(|p| (p & 0xffff) as f32 * (RANGE / 127.0 / 65_536.0));
+            let [column, line] = [x, y].map(|p| (p >> BITS) as usize % SIDE);
+            let [a, b, c, d] = self.texels[line * SIDE + column].map(f32::from);
+            let [u, v] = position.map(|p| (p >> (BITS - 16) & 0xffff) as f32 * (RANGE / 127.0 / 65_536.0));
             // u is in units of the pool, v is a fraction.
             let v = v * (127.0 / RANGE);
             let (upper, lower) = (unit(a, b, u), unit(c, d, u));
             *value = upper + v * (lower - upper);
             position = [x.wrapping_add(step[0]), y.wrapping_add(step[1])];
+            step[0] = step[0].wrapping_add(change);
         }
     }
 }
@@ -252,10 +280,12 @@ fn unit(a: f32, b: f32, u: f32) -> f32 {
     a * (RANGE / 127.0) + u * (b - a)
 }
 
-/// Returns a position in 2⁻¹⁶ texels, which wraps without rounding.
-fn fixed(texels: f64) -> u32 {
-    // The cast to 32 bits wraps, as intended.
-    (texels * 65_536.0).floor() as i64 as u32
+/// Bits of the fraction of a position: rounding of a bend stays below 2⁻²⁰ texels over a row of a thousand pixels.
+const BITS: u32 = 40;
+
+/// Returns a position in units of 2 to the power of -[`BITS`] texels, which wraps without rounding.
+fn fixed(texels: f64) -> u64 {
+    (texels * (1_u64 << BITS) as f64).floor() as i64 as u64
 }
 
 #[cfg(test)]
@@ -275,12 +305,15 @@ pub(crate) mod tests {
         };
         for angle in [0.0, 0.4, 1.8, 3.3, 5.9] {
             let (sin, cos) = (0.8 * libm::sin(angle), 0.8 * libm::cos(angle));
-            let sampler = PoolSampler { origin: [500.3, 7.8], along: [cos, sin], down: [-sin, cos] };
+            let (along, down) = ([cos, sin], [-sin, cos]);
+            let sampler = PoolSampler { origin: [500.3, 7.8], centre: [20.0, -40.0], along, down, bend: 0.004 };
             let mut row = [0.0; 70];
             pool.row_into(&mut row, &sampler, [3.0, 11.0]);
             for (i, value) in row.iter().enumerate() {
                 let (i, j) = (3.0 + i as f64, 11.0);
-                let [x, y] = [500.3 + i * cos - j * sin, 7.8 + i * sin + j * cos];
+                let (i, j) = (i - 20.0, j + 40.0);
+                let bent = 0.5 * 0.004 / 0.8 * (i * sin + j * cos) * (i * sin + j * cos);
+                let [x, y] = [500.3 + i * cos - j * sin + bent, 7.8 + i * sin + j * cos];
                 let [u, v] = [x - x.floor(), y - y.floor()];
                 let upper = rounded(x, y) * (1.0 - u) + rounded(x + 1.0, y) * u;
                 let lower = rounded(x, y + 1.0) * (1.0 - u) + rounded(x + 1.0, y + 1.0) * u;
@@ -320,7 +353,8 @@ pub(crate) mod tests {
         for name in pools.texture.kinds.iter().map(|kind| &kind.name) {
             let mut coherence = 0.0;
             for direction in [0.0, 0.6, 1.9, 2.8] {
-                let sampler = pools.sampler(0.33, direction, &mut rng);
+                let streaks = Streaks { across: direction, bend: 0.0, centre: [0.0; 2] };
+                let sampler = pools.sampler(0.33, streaks, &mut rng);
                 let mut rows = vec![[0.0; WIDTH]; WIDTH];
                 for (y, row) in rows.iter_mut().enumerate() {
                     pools.pool(name).unwrap().row_into(row, &sampler, [0.0, y as f64]);

@@ -27,7 +27,7 @@ pub(super) fn add_detail(
     let (detail, noise_fields, pixel_um) = (&cell.body.detail, cell.noise_fields, cell.pixel_um());
     let mut clouds = Clouds::new(absorbance, cell, rng);
     let flecks = FieldSampler::fine(pixel_um, rng);
-    let mut texture = FineTexture::new(cell, inner)?;
+    let mut texture = FineTexture::new(absorbance, cell, inner)?;
     let (cloud, fleck) = (detail.clouds as f32, detail.flecks as f32);
     let threshold = if fleck > 0.0 { noise_fields.flecks().quantile(detail.flecks_threshold) } else { 0.0 };
     let width = absorbance.width;
@@ -319,7 +319,7 @@ impl CoarseTile {
     }
 
     /// Samples a noise field.
-    fn noise(like: &Tile, noise_field: &NoiseField, sampler: &FieldSampler) -> Self {
+    pub(super) fn noise(like: &Tile, noise_field: &NoiseField, sampler: &FieldSampler) -> Self {
         let mut drawn = Self::blank(like);
         let (sampler, mut texels) = (sampler.coarser(COARSE as f64), [0.0; SIDE + 1]);
         for (y, row) in drawn.coarse.values.chunks_exact_mut(drawn.coarse.width).enumerate() {
