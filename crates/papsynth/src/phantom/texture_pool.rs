@@ -250,7 +250,8 @@ impl Pool {
         let PoolSampler { origin, centre, along, down, bend } = sampler;
         let at = [0, 1].map(|axis| first[axis] - centre[axis]);
         let mut position = [0, 1].map(|axis| origin[axis] + at[0] * along[axis] + at[1] * down[axis]);
-        // The coordinate v at the first pixel and its change along the row, and the differences of the displacement.
+        // Texels per pixel; v at the first pixel, which decreases by the sine along the row; and the first and second
+        // differences of the displacement.
         let texels = libm::hypot(along[0], down[0]);
         let [sin, cos] = [down[0] / texels, along[0] / texels];
         let v = at[1] * cos - at[0] * sin;
