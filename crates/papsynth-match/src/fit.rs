@@ -12,7 +12,7 @@ use crate::compare::{LEAST_FIELDS as LEAST_REFINED, Refine, Refinement, report};
 use crate::distance::{Distance, Statistic, statistics};
 use crate::error::Error;
 use crate::hues::correct;
-use crate::measured::{Measured, measure_in};
+use crate::measured::{Measured, measure_in, spread_around};
 use crate::parameter::{PARAMETERS, Parameter, Prior, Source, Values};
 use crate::posterior::{FUSED_SD, Knowledge, NEAR_SD, PRIOR_SD, Posterior, Response, Rows};
 use crate::recipe::{Setting, matched, recipe, simulated};
@@ -385,15 +385,6 @@ fn corrected(colour: bool) -> [usize; 2] {
     if colour { CORRECTIONS.map(|rounds| rounds * HUED) } else { [0; 2] }
 }
 
-/// Returns the standard deviation around each of `count` fields, given the error of its parameter and the standard
-/// deviation between fields.
-///
-/// A further field has a variance of 1 + 1/n times that between fields around the mean of n fields, because this mean
-/// has an error too; the n fields themselves have only 1 − 1/n.
-fn spread_around(error: f64, between: f64, count: usize) -> f64 {
-    (error * error + 2.0 * between * between / count as f64).sqrt()
-}
-
 /// Returns the usual standard deviation of a parameter around the initial recipe.
 fn near(setting: &Setting, parameter: Parameter) -> f64 {
     match parameter {
@@ -548,7 +539,7 @@ impl Search<'_> {
             }
         }
         for (parameter, _) in &self.measured.fields[field] {
-            let spread = spread_around(0.0, self.measured.spread(*parameter), self.real.len());
+            let spread = self.measured.spreads_around(*parameter)[field];
             values.set_spread(*parameter, parameter.prior().difference(spread));
         }
         values
@@ -602,26 +593,6 @@ impl Search<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use portable_numerics::random::below;
-
-    #[test]
-    fn fields_of_a_recipe_are_as_far_from_the_mean_of_the_real_ones_as_further_real_fields() {
-        const TRIALS: u64 = 20_000;
-        let square = |v: f64| v * v;
-        let rng = &mut Xoshiro256PlusPlus::seed_from_u64(5);
-        for count in [2, 4, 8] {
-            let [mut further, mut simulated] = [0.0; 2];
-            for _ in 0..TRIALS {
-                let fields: Vec<f64> = (0..count).map(|_| normal(rng)).collect();
-                let mean = fields.iter().sum::<f64>() / count as f64;
-                further += square(normal(rng) - mean) / TRIALS as f64;
-                let like = fields[below(count, rng)] + spread_around(0.0, 1.0, count) * normal(rng);
-                simulated += square(like - mean) / TRIALS as f64;
-            }
-            // Both have a standard error of about 1.5 %.
-            assert!((simulated / further - 1.0).abs() < 0.06, "{count}: {simulated} {further}");
-        }
-    }
 
     #[test]
     fn a_field_of_another_magnification_is_an_error() {

@@ -71,11 +71,46 @@ impl Measured {
 
     /// Returns the standard deviation of a parameter between fields, as a difference of positions in its range.
     pub(crate) fn spread(&self, parameter: Parameter) -> f64 {
-        let of_parameter = self.fields.iter().flatten().filter(|(p, _)| *p == parameter);
-        let places: Vec<f64> = of_parameter.map(|(_, value)| parameter.prior().place(*value)).collect();
-        let sd = portable_numerics::statistics::deviation(&places);
+        let sd = deviation(&self.places(parameter));
         if sd.is_finite() { sd } else { 0.0 }
     }
+
+    /// Returns the standard deviation of a parameter around each field, as a difference of positions in its range.
+    pub(crate) fn spreads_around(&self, parameter: Parameter) -> Vec<f64> {
+        let places = self.places(parameter);
+        around(&places, spread_around(0.0, self.spread(parameter), places.len()))
+    }
+
+    /// Returns the positions of the values of all fields in the range of a parameter.
+    fn places(&self, parameter: Parameter) -> Vec<f64> {
+        let of_parameter = self.fields.iter().flatten().filter(|(p, _)| *p == parameter);
+        of_parameter.map(|(_, value)| parameter.prior().place(*value)).collect()
+    }
+}
+
+/// Returns the standard deviation around each of `count` fields, given the error of its parameter and the standard
+/// deviation between fields.
+///
+/// A further field has a variance of 1 + 1/n times that between fields around the mean of n fields, because this mean
+/// has an error too; the n fields themselves have only 1 − 1/n.
+pub(crate) fn spread_around(error: f64, between: f64, count: usize) -> f64 {
+    (error * error + 2.0 * between * between / count as f64).sqrt()
+}
+
+/// Returns a standard deviation around each value, with a root mean square of `all`.
+///
+/// They are proportional to the distances to the nearest other values (variable kernel; Breiman, Meisel and Purcell
+/// 1977, doi:10.1080/00401706.1977.10489521). So there are no fields between those of two exposures, and fields at the
+/// highest grey level stay there.
+fn around(values: &[f64], all: f64) -> Vec<f64> {
+    let nearest = |(i, value): (usize, &f64)| {
+        let others = values.iter().enumerate().filter(|(j, _)| *j != i);
+        others.map(|(_, other)| (other - value).abs()).fold(f64::INFINITY, f64::min)
+    };
+    let distances: Vec<f64> = values.iter().enumerate().map(nearest).collect();
+    let rms = (distances.iter().map(|d| d * d).sum::<f64>() / distances.len() as f64).sqrt();
+    let even = !(rms.is_finite() && rms > 0.0);
+    distances.iter().map(|distance| if even { all } else { all * distance / rms }).collect()
 }
 
 /// Returns the source of nuclei that all fields have.
@@ -303,6 +338,40 @@ fn of_mean(sd: f64, count: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use portable_numerics::random::{below, normal};
+    use rand_core::SeedableRng;
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    #[test]
+    fn fields_of_a_recipe_are_as_far_from_the_mean_of_the_real_ones_as_further_real_fields() {
+        const TRIALS: u64 = 20_000;
+        let square = |v: f64| v * v;
+        let rng = &mut Xoshiro256PlusPlus::seed_from_u64(5);
+        for count in [2, 4, 8] {
+            let [mut further, mut simulated] = [0.0; 2];
+            for _ in 0..TRIALS {
+                let fields: Vec<f64> = (0..count).map(|_| normal(rng)).collect();
+                let mean = fields.iter().sum::<f64>() / count as f64;
+                further += square(normal(rng) - mean) / TRIALS as f64;
+                let like = fields[below(count, rng)] + spread_around(0.0, 1.0, count) * normal(rng);
+                simulated += square(like - mean) / TRIALS as f64;
+            }
+            // Both have a standard error of about 1.5 %.
+            assert!((simulated / further - 1.0).abs() < 0.06, "{count}: {simulated} {further}");
+        }
+    }
+
+    #[test]
+    fn spreads_around_fields_follow_the_distances_between_them_and_keep_the_variance() {
+        let found = around(&[0.2, 0.6, 0.99, 0.99, 0.95], 0.1);
+        let square = found.iter().map(|sd| sd * sd).sum::<f64>() / 5.0;
+        assert!((square.sqrt() - 0.1).abs() < 1e-12, "{found:?}");
+        assert!((found[0] / found[1] - 0.4 / 0.35).abs() < 1e-9 && found[2] == 0.0 && found[4] < 0.02, "{found:?}");
+        // Equal fields, one field, and no field.
+        assert_eq!(around(&[0.3; 3], 0.2), [0.2; 3]);
+        assert_eq!(around(&[0.3], 0.2), [0.2]);
+        assert_eq!(around(&[], 0.2), [0.0; 0]);
+    }
 
     #[test]
     fn level_and_noise_are_restored_where_planes_are_clipped() {

@@ -87,7 +87,8 @@ impl TexturePools {
             Some(texels) => texels.to_vec(),
             None => rounded(&synthesized(&kinds[index])?),
         };
-        Ok(self.pools[index].get_or_init(|| Pool::new(&texels)))
+        let skewed: Vec<u8> = texels.into_iter().map(skewed).collect();
+        Ok(self.pools[index].get_or_init(|| Pool::new(&skewed)))
     }
 
     /// Draws a place and a mirroring. `pixel_um` is the size of the pixels that are drawn, relative to that of the
@@ -232,6 +233,18 @@ fn rounded(values: &[f32]) -> Vec<u8> {
     values.iter().map(|v| (libm::rintf(v.clamp(-RANGE, RANGE) * (127.0 / RANGE)) + 128.0) as u8).collect()
 }
 
+/// Weight of the square of a texture: cytoplasm has dark grains rather than pale ones.
+///
+/// In windows of 40 pixels of 0.33 µm inside cells of Cervix93, between nuclei and folds, band-pass responses have a
+/// skewness of 0.2 at 1 px and of 0.4 at 2 px, and cells with strong texture have no more than others.
+const SKEWNESS: f32 = 0.08;
+
+/// Adds the square of a value with mean 0 and variance 1, as [`rounded`] returns it. Mean and variance stay the same.
+fn skewed(texel: u8) -> u8 {
+    let value = f32::from(texel.wrapping_sub(128).cast_signed()) * (RANGE / 127.0);
+    rounded(&[(value + SKEWNESS * (value * value - 1.0)) / (1.0 + 2.0 * SKEWNESS * SKEWNESS).sqrt()])[0]
+}
+
 impl Pool {
     /// Makes a pool of rounded values.
     fn new(rounded: &[u8]) -> Self {
@@ -322,6 +335,20 @@ pub(crate) mod tests {
                 assert!((f64::from(*value) - slow).abs() < 0.02, "{angle} {i}: {value} {slow}");
             }
         }
+    }
+
+    #[test]
+    fn a_skewed_texture_keeps_mean_and_variance() {
+        let mut rng = Key { seed: 8, index: 0 }.stream("test", 0, "skewness");
+        let normals: Vec<f32> = (0..100_000).map(|_| random::normal(&mut rng) as f32).collect();
+        let unit = |texel: u8| f64::from(texel.wrapping_sub(128).cast_signed()) * f64::from(RANGE) / 127.0;
+        let values: Vec<f64> = rounded(&normals).into_iter().map(|texel| unit(skewed(texel))).collect();
+        let mean = |f: fn(f64) -> f64| values.iter().map(|value| f(*value)).sum::<f64>() / values.len() as f64;
+        assert!(mean(|v| v).abs() < 0.01 && (mean(|v| v * v) - 1.0).abs() < 0.015);
+        // The skewness of x + k x² is 6 k + 8 k³, for k much smaller than 1.
+        let k = f64::from(SKEWNESS);
+        assert!((mean(|v| v * v * v) - 6.0 * k - 8.0 * k * k * k).abs() < 0.04, "{}", mean(|v| v * v * v));
+        assert!((0..=255).zip(1..=255).all(|(texel, next)| skewed(texel) <= skewed(next)));
     }
 
     #[test]

@@ -296,7 +296,7 @@ section! {
         /// Width of a wrinkle: standard deviation of its profile. Rolled stretches of the rim have 0.4 to 0.9 µm.
         wrinkle_um: Number (given f64) = Number::uniform(0.25, 0.8), 0.05..=5, "µm";
         /// Additional thickness of the inner cytoplasm, relative to the rest: 1.4 times this number.
-        endoplasm: Number (given f64) = Number::log_normal(0.3, 0.5).at_most(1.5), 0..=2;
+        endoplasm: Number (given f64) = Number::log_normal(0.3, 0.9).at_most(1.4), 0..=2;
         /// Amplitude of the first level of detail, low-frequency noise, relative to the absorbance of the cytoplasm.
         /// Dark places are smaller and stronger than pale ones.
         clouds: Number = Number::log_normal(0.11, 0.5).at_most(0.4), 0..=2;
