@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
-use super::detail::CoarseTile;
+use super::coarse_tile::CoarseTile;
 use crate::error::ErrorKind;
 use crate::phantom::cell_context::CellContext;
 use crate::phantom::noise_fields::FieldSampler;

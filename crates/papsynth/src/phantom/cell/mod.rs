@@ -3,6 +3,7 @@
 
 use cloth_verlet::{Crease, FoldKind, PixelGrid, Sheet, SheetSpec, Wave, crease_outline};
 
+mod coarse_tile;
 mod degeneration;
 mod detail;
 mod fine_texture;
