@@ -117,13 +117,16 @@ class Browser:
         assert "exceptionDetails" not in outcome, outcome
         return outcome["result"].get("value")
 
-    def until(self, condition, otherwise=lambda: ""):
-        end = time.monotonic() + PATIENCE_S
-        while time.monotonic() < end:
-            if self.run(condition):
-                return
+    def until(self, condition, status=lambda: ""):
+        """Waits until the condition is true; gives up when `status` has not changed for PATIENCE_S seconds."""
+        last, end = None, time.monotonic() + PATIENCE_S
+        while not self.run(condition):
+            if time.monotonic() > end:
+                now = status()
+                if now == last:
+                    raise SystemExit(f"waited for {condition}; {now}")
+                last, end = now, time.monotonic() + PATIENCE_S
             time.sleep(0.01)
-        raise SystemExit(f"waited for {condition}; {otherwise()}")
 
     def press(self, key):
         codes = {
