@@ -113,7 +113,7 @@ parameters! {
     /// Stain of the nuclei of a field.
     FieldNucleus: Simulated, Field, Logarithmic 0.35..3.5 "", "stain.field_nucleus";
     /// Contrast of chromatin.
-    Texture: Simulated, Field, Logarithmic 0.1..2.5 "", "stain.field_texture";
+    Texture: Simulated, Field, Logarithmic 0.2..1.6 "", "stain.field_texture";
     /// Factor on the standard deviation of the absorbance of cytoplasm between cells.
     CytoplasmVariation: Simulated, All, Linear 0.0..2.5 "", "stain.cytoplasm_variation";
     /// Factor on the standard deviations of absorbance and texture between nuclei.
