@@ -119,7 +119,7 @@ class Browser:
 
     def until(self, condition, status=lambda: ""):
         """Waits until the condition is true; gives up when `status` has not changed for PATIENCE_S seconds."""
-        last, end = None, time.monotonic() + PATIENCE_S
+        last, end = "", time.monotonic() + PATIENCE_S
         while not self.run(condition):
             if time.monotonic() > end:
                 now = status()
