@@ -494,8 +494,8 @@ class Cytoplasm(Section):
     """
 
     clouds_um: Number | None = None
-    """Standard deviation of the smoothing of that noise: two noise fields with 1.2 and 0.6 times this number, each
-    stretched about along the streaks of the fine texture. From 0.1 to 100 µm.
+    """Standard deviation of the smoothing of that noise: three noise fields with 2.4, 1.2 and 0.6 times this number,
+    each stretched about along the streaks of the fine texture. From 0.1 to 100 µm.
     """
 
     clouds_stretch: Number | None = None
@@ -547,7 +547,8 @@ class Cytoplasm(Section):
 
     rim_um: Number | None = None
     """Width of the marginal zone in which the sheet becomes thinner. The thickness increases exponentially with the
-    distance from the rim: at this distance, it is 86 % of that far from the rim. From 0 to 10 µm.
+    distance from the rim: at this distance, it is 86 % of that far from the rim. Parts of the rim slope over another 8
+    µm; not with 0. From 0 to 10 µm.
     """
 
     thickness_gradient: Number | None = None

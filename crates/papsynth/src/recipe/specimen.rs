@@ -300,8 +300,8 @@ section! {
         /// Amplitude of the first level of detail, low-frequency noise, relative to the absorbance of the cytoplasm.
         /// Dark places are smaller and stronger than pale ones.
         clouds: Number = Number::log_normal(0.11, 0.5).at_most(0.4), 0..=2;
-        /// Standard deviation of the smoothing of that noise: two noise fields with 1.2 and 0.6 times this number, each
-        /// stretched about along the streaks of the fine texture.
+        /// Standard deviation of the smoothing of that noise: three noise fields with 2.4, 1.2 and 0.6 times this
+        /// number, each stretched about along the streaks of the fine texture.
         clouds_um: Number = Number::log_normal(2.5, 0.6).at_least(0.7).at_most(14.0), 0.1..=100, "µm";
         /// Length of the clouds relative to their width, with the same area; 1 for round clouds.
         clouds_stretch: Number = Number::log_normal(2.0, 0.5).at_least(1.0).at_most(4.0), 1..=20;
@@ -334,13 +334,14 @@ section! {
         /// Amplitude of the irregularity of the outline.
         fray_um: Number = Number::log_normal(0.65, 0.45), 0..=5, "µm";
         /// Width of the marginal zone in which the sheet becomes thinner. The thickness increases exponentially with
-        /// the distance from the rim: at this distance, it is 86 % of that far from the rim.
+        /// the distance from the rim: at this distance, it is 86 % of that far from the rim. Parts of the rim slope
+        /// over another 8 µm; not with 0.
         rim_um: Number (given f64) = Number::log_normal(2.2, 0.36), 0..=10, "µm";
         /// Gradient of the thickness of the sheet: standard deviation of the relative change over the radius of the
         /// cell.
         thickness_gradient: Number
             (given [f64; 2] as thickness_gradient: "Relative change of the thickness over a radius to the right and downwards.")
-            = 0.18, 0..=1;
+            = 0.22, 0..=1;
         /// Phase delay of the flat sheet; elsewhere proportional to the thickness. Causes a bright or dark rim that
         /// reverses between the two sides of focus.
         phase_rad: Number (undrawn) = Number::uniform(0.05, 0.15), -3..=3, "radians of phase";

@@ -63,8 +63,9 @@ const THIN: f32 = 0.6;
 /// Smallest relative deviation by the texture, so that strong texture makes no holes at thin rims. Set by eye.
 const PALEST: f32 = -0.6;
 
-/// Sizes of the two noise fields of clouds, relative to `clouds_um`. Set by eye.
-const CLOUDS_SIZES: [f64; 2] = [1.2, 0.6];
+/// Sizes of the noise fields of clouds, relative to `clouds_um`, and their variances, which add up to 1.
+const CLOUDS_SIZES: [f64; 3] = [2.4, 1.2, 0.6];
+const CLOUDS_VARIANCES: [f32; 3] = [0.4, 0.4, 0.2];
 
 /// Standard deviation of the direction of clouds from that of the streaks of the cell, radians.
 ///
@@ -72,15 +73,15 @@ const CLOUDS_SIZES: [f64; 2] = [1.2, 0.6];
 /// radians it is 0.26 in simulated ones, with this number 0.19.
 const CLOUDS_DEVIATION: f64 = 0.7;
 
-/// The clouds of a cell: the sum of two noise fields, each stretched about along the streaks, with variance 1.
+/// The clouds of a cell: the sum of noise fields, each stretched about along the streaks, with variance 1.
 /// Cytoplasm of real cells has strands and folds rather than round clouds.
 struct Clouds<'a> {
     noise_field: &'a NoiseField,
-    samplers: [FieldSampler; 2],
+    samplers: [FieldSampler; CLOUDS_SIZES.len()],
     /// Wide clouds, drawn with coarse pixels.
-    wide: [Option<CoarseTile>; 2],
-    /// A row of the second noise field.
-    second_row: Vec<f32>,
+    wide: [Option<CoarseTile>; CLOUDS_SIZES.len()],
+    /// A row of one noise field.
+    field: Vec<f32>,
 }
 
 impl<'a> Clouds<'a> {
@@ -96,33 +97,26 @@ impl<'a> Clouds<'a> {
             return None;
         }
         let noise_field = cell.noise_fields.clouds();
-        let mut wide = [None, None];
+        let mut wide = CLOUDS_SIZES.map(|_| None);
         for ((wide, sampler), sigma_px) in wide.iter_mut().zip(&samplers).zip(sizes) {
             let is_wide = sigma_px / detail.clouds_stretch.sqrt() >= SMOOTH_PX;
             *wide = is_wide.then(|| CoarseTile::noise(like, noise_field, sampler));
         }
-        Some(Self { noise_field, samplers, wide, second_row: vec![0.0; like.width] })
+        Some(Self { noise_field, samplers, wide, field: vec![0.0; like.width] })
     }
 
     /// Writes columns of row `y` of the tile.
     fn row_into(&mut self, row: &mut [f32], columns: Range<usize>, y: usize, texels: &mut Texels) {
-        let Self { noise_field, samplers, wide, second_row } = self;
+        let Self { noise_field, samplers, wide, field } = self;
         let at = [columns.start as f64, y as f64];
-        for ((row, sampler), wide) in [&mut *row, second_row].into_iter().zip(samplers).zip(wide) {
+        row[columns.clone()].fill(0.0);
+        for ((sampler, wide), variance) in samplers.iter().zip(wide).zip(CLOUDS_VARIANCES) {
             match wide {
-                Some(wide) => wide.row_into(row, y),
-                None => noise_field.row_into(&mut row[columns.clone()], sampler, at, texels),
+                Some(wide) => wide.row_into(field, y),
+                None => noise_field.row_into(&mut field[columns.clone()], sampler, at, texels),
             }
+            add_row(&mut row[columns.clone()], &field[columns.clone()], variance.sqrt());
         }
-        add_clouds(&mut row[columns.clone()], &second_row[columns]);
-    }
-}
-
-/// Adds two independent rows and keeps their variance.
-#[multiversion(targets = "simd")]
-fn add_clouds(row: &mut [f32], other: &[f32]) {
-    for (value, other) in row.iter_mut().zip(other) {
-        *value = core::f32::consts::FRAC_1_SQRT_2 * (*value + other);
     }
 }
 
@@ -138,22 +132,24 @@ const CLOUD_LIMITS: [f32; 2] = [-1.4, 1.7];
 /// Mean of limited clouds with their square.
 const CLOUD_MEAN: f32 = 0.2957;
 
-/// Multiplies a row by 1 plus the clouds and the flecks above a threshold, times their strengths, plus the texture.
-/// Clouds are limited, and skewed by their square; their standard deviation becomes 0.98. Negative factors count as 0.
+/// Multiplies a row by 1 plus the clouds and the flecks above a threshold, times their strengths, and by 1 plus the
+/// texture. Clouds are limited, and skewed by their square; their standard deviation becomes 0.98. Negative factors
+/// count as 0.
 ///
-/// The texture adds up at random over the thickness, so that its relative deviation is inversely proportional to the
-/// root of the thickness down to [`THIN`]: it is strong at thin rims and weak on folds.
+/// The relative deviation of the texture is inversely proportional to the fourth root of the thickness, down to
+/// [`THIN`]. Within single cells of Cervix93, the amplitude of details of 1 to 3 px is proportional to the power 0.6 to
+/// 0.9 of the absorbance around them: dark places are granular, too.
 #[multiversion(targets = "simd")]
 fn modulate(row: &mut [f32], [clouds, flecks, texture]: [&[f32]; 3], strengths: [f32; 2], threshold: f32) {
     for (((value, cloud), &fleck), texture) in row.iter_mut().zip(clouds).zip(flecks).zip(texture) {
         let above = if fleck > threshold { fleck - threshold } else { 0.0 };
         let thickness = if *value > 0.0 { *value } else { 0.0 };
-        let deviation = texture * (TEXTURE_THICKNESS / if thickness > THIN { thickness } else { THIN }).sqrt();
+        let thinness = TEXTURE_THICKNESS / if thickness > THIN { thickness } else { THIN };
+        let deviation = texture * thinness.sqrt().sqrt();
         let cloud = cloud.clamp(CLOUD_LIMITS[0], CLOUD_LIMITS[1]);
         let cloud = cloud + CLOUD_SQUARE * cloud * cloud - CLOUD_MEAN;
         let deviation = if deviation > PALEST { deviation } else { PALEST };
-        let factor = 1.0 + strengths[0] * cloud + strengths[1] * above + deviation;
-        let changed = thickness * factor;
+        let changed = thickness * (1.0 + strengths[0] * cloud + strengths[1] * above) * (1.0 + deviation);
         *value = if changed > 0.0 { changed } else { 0.0 };
     }
 }
@@ -233,6 +229,43 @@ pub(super) fn thin_rim(absorbance: &mut Tile, coverage: &Tile, distance_px: f64)
             thin(values, sums, weight);
         }
     });
+}
+
+/// Standard deviation of the Gaussian that smooths the inside of a cell for [`slope_rim`], µm.
+const SLOPE_UM: f64 = 4.0;
+
+/// Largest relative decrease of the thickness at the rim. Set by eye, with single cells of Cervix93 as guide
+/// (docs/decisions.md, "Sloping rims").
+const SLOPE: f32 = 0.7;
+
+/// Standard deviation of the smoothing of the noise that makes some parts of the rim slope and others not, µm.
+const SLOPE_CHANGES_UM: f64 = 5.0;
+
+/// Thins a broad zone along parts of the rim, whose thickness increases gradually.
+pub(super) fn slope_rim(absorbance: &mut Tile, outline: &[Point], cell: &CellContext<'_>) {
+    if cell.body.detail.rim_um <= 0.0 {
+        return;
+    }
+    let (pixel_um, mut rng) = (cell.pixel_um(), cell.stream("slope"));
+    let mut zone = CoarseTile::smoothed(absorbance, outline, SLOPE_UM / pixel_um);
+    let sampler = FieldSampler::clouds(SLOPE_CHANGES_UM / pixel_um, &mut rng);
+    let mut noise = CoarseTile::noise(absorbance, cell.noise_fields.clouds(), &sampler);
+    let [mut smoothed, mut slopes] = [(); 2].map(|()| vec![0.0; absorbance.width]);
+    for (y, row) in absorbance.values.chunks_exact_mut(smoothed.len()).enumerate() {
+        zone.row_into(&mut smoothed, y);
+        noise.row_into(&mut slopes, y);
+        slope_row(row, &smoothed, &slopes);
+    }
+}
+
+/// Thins a row where `smoothed`, the smoothed inside of the cell, is below 1, in proportion to a slope between 0 and 1
+/// from noise.
+#[multiversion(targets = "simd")]
+fn slope_row(row: &mut [f32], smoothed: &[f32], noise: &[f32]) {
+    for ((value, smoothed), noise) in row.iter_mut().zip(smoothed).zip(noise) {
+        let beyond = (2.0 - 2.0 * smoothed).clamp(0.0, 1.0);
+        *value *= 1.0 - SLOPE * beyond * (0.5 + 0.5 * noise).clamp(0.0, 1.0);
+    }
 }
 
 /// Returns the thickness of a sheet relative to the rest, at a distance from its rim in widths of the marginal zone.
@@ -413,11 +446,17 @@ mod tests {
             row[0] / thickness - 1.0
         };
         let linear = |thickness| (relative(thickness, 0.01) - relative(thickness, -0.01)) / 0.02;
-        for (thickness, expected) in [(5.2, 0.5), (1.3, 1.0), (0.6, 1.472), (0.2, 1.472)] {
+        for (thickness, expected) in [(20.8, 0.5), (1.3, 1.0), (0.6, 1.213), (0.2, 1.213)] {
             let found = linear(thickness);
             assert!((found - expected).abs() < 0.01, "{thickness}: {found}");
         }
         assert!((relative(1.3, 0.8) - 0.8).abs() < 1e-5 && (relative(0.3, -3.0) + 0.6).abs() < 1e-5);
+        // The texture of a dark cloud is as strong as the cloud.
+        let mut rows = [[1.3_f32]; 2];
+        for (row, texture) in rows.iter_mut().zip([0.0, 0.1]) {
+            modulate(row, [&[1.0], &[0.0], &[texture]], [0.4, 0.0], 0.0);
+        }
+        assert!((rows[1][0] / rows[0][0] - 1.1).abs() < 1e-5, "{rows:?}");
         for thickness in [0.0, -0.2] {
             let mut row = [thickness];
             modulate(&mut row, [&[0.0], &[0.0], &[0.5]], [0.0; 2], 0.0);
@@ -443,27 +482,34 @@ mod tests {
     }
 
     #[test]
-    fn the_sum_of_two_rows_of_clouds_has_the_variance_of_each() {
+    fn the_fields_of_clouds_have_variance_1_together() {
         let generator = NoiseFieldGenerator::new();
         let noise_fields = generator.fields(Key { seed: 6, index: 0 });
         let mut rng = Key { seed: 6, index: 0 }.stream("test", 0, "clouds");
-        let [mut one, mut squares, mut count] = [0.0, 0.0, 0.0];
+        let [mut each, mut together] = [0.0, 0.0];
         for _ in 0..400 {
-            let mut rows = [(); 2].map(|()| {
-                let sampler = FieldSampler::clouds(2.0, &mut rng).stretched(2.5, random::direction(&mut rng));
-                let mut row = vec![0.0_f32; 300];
-                noise_fields.clouds().row_into(&mut row, &sampler, [0.0; 2], &mut [0.0; SIDE + 1]);
-                row
-            });
-            let sum = |row: &[f32]| row.iter().map(|v| f64::from(v * v)).sum::<f64>();
-            one += rows.iter().map(|row| 0.5 * sum(row)).sum::<f64>();
-            let [first, second] = &mut rows;
-            add_clouds(first, second);
-            squares += sum(first);
-            count += first.len() as f64;
+            let mut row = vec![0.0_f32; 300];
+            for (size, variance) in CLOUDS_SIZES.into_iter().zip(CLOUDS_VARIANCES) {
+                let sampler = FieldSampler::clouds(2.0 * size, &mut rng).stretched(2.5, random::direction(&mut rng));
+                let mut field = row.clone();
+                noise_fields.clouds().row_into(&mut field, &sampler, [0.0; 2], &mut [0.0; SIDE + 1]);
+                each += f64::from(variance) * field.iter().map(|v| f64::from(v * v)).sum::<f64>();
+                add_row(&mut row, &field, variance.sqrt());
+            }
+            together += row.iter().map(|v| f64::from(v * v)).sum::<f64>();
         }
         // One field of finite size has another variance than the mean of all fields.
-        assert!((squares / one - 1.0).abs() < 0.05 && (one / count - 1.0).abs() < 0.1, "{one} {squares} {count}");
+        let count = 400.0 * 300.0;
+        assert!((together / each - 1.0).abs() < 0.05 && (each / count - 1.0).abs() < 0.1, "{together} {each} {count}");
+    }
+
+    #[test]
+    fn a_sloping_rim_is_thin_at_the_outline_and_unchanged_inside() {
+        // Smoothed, the inside is 0.5 at a straight outline.
+        let smoothed = [0.5, 0.75, 1.0, 1.0, 0.5];
+        let mut row = [1.0; 5];
+        slope_row(&mut row, &smoothed, &[1.0, 1.0, 1.0, -1.0, -1.0]);
+        assert_eq!(row, [1.0 - SLOPE, 1.0 - 0.5 * SLOPE, 1.0, 1.0, 1.0]);
     }
 
     #[test]

@@ -229,6 +229,7 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
     detail::apply_gradient(&mut absorbance, plan.centre, body.radius_um / pixel_um, body.detail.thickness_gradient);
     let rim_um = if folded { body.detail.rim_um.min(FOLD_EDGE_UM) } else { body.detail.rim_um };
     detail::thin_rim(&mut absorbance, &coverage, rim_um / pixel_um);
+    detail::slope_rim(&mut absorbance, &plan.outline, cell);
     let nucleus = [0, 1].map(|axis| plan.centre[axis] + body.nucleus.off_centre[axis] * body.radius_um / pixel_um);
     let mut canvas = vec![0.0; absorbance.values.len() + wrinkles::LANES];
     wrinkles.add(&mut absorbance, &coverage, &mut canvas);
