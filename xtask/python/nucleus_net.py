@@ -41,6 +41,7 @@ REACH = 12  # largest distance of a detection from a nucleus, pixels
 THRESHOLD = 0.7  # probability of detections, chosen on the half of the fields that a recipe is matched to
 MASK_THRESHOLD = 0.5  # probability of masks
 SMALLEST = 60  # area of a detection, pixels
+BORDER = 2  # regions this near to the border of the image are at it, pixels: the network decides pairs of pixels
 NECK = 0.5  # least depth of a neck at which a region is split, pixels; chosen on the same half
 EMPTY = 0.96  # least light of the empty slide, relative to its mean there: cytoplasm and specks are darker
 FITS = 5  # of the light of the empty slide
@@ -253,7 +254,9 @@ def probability(net, image):
 
 def at_border(regions):
     """Return the numbers of the regions at the border of the image."""
-    border = np.unique(np.concatenate([regions[0], regions[-1], regions[:, 0], regions[:, -1]]))
+    inside = np.zeros(regions.shape, bool)
+    inside[BORDER:-BORDER, BORDER:-BORDER] = True
+    border = np.unique(regions[~inside])
     return border[border > 0]
 
 

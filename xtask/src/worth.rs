@@ -46,7 +46,7 @@ const LEUKOCYTES: [(&str, &[&str]); 2] = [
 const WIDEN: &str = "1.5";
 
 /// Version of `nucleus_net.py` and of its sets: results of another version are kept apart.
-const METHOD: u32 = 8;
+const METHOD: u32 = 9;
 
 /// Version of `overlap_net.py` and of its sets: results of another version are kept apart.
 const OVERLAP_METHOD: u32 = 3;

@@ -12,7 +12,7 @@ pub type Stream = Xoshiro256PlusPlus;
 
 /// Version of the mapping from keys to numbers, and from numbers to images. It changes if the same recipe, model, seed
 /// and index give another image, and is recorded in each data set.
-pub const STREAM_VERSION: u32 = 35;
+pub const STREAM_VERSION: u32 = 36;
 
 /// The last [`STREAM_VERSION`] that changed the random numbers.
 const NUMBERS_VERSION: u32 = 3;

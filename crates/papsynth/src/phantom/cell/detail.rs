@@ -1,4 +1,4 @@
-//! Detail of cytoplasm: clouds, flecks, fine texture, cytoskeleton, endoplasm.
+//! Detail of cytoplasm: clouds, flecks, fine texture, cytoskeleton.
 
 use core::ops::Range;
 
@@ -9,13 +9,11 @@ use super::coarse_tile::{CoarseTile, SMOOTH_PX};
 use super::fine_texture::FineTexture;
 use crate::error::ErrorKind;
 use crate::key::Stream;
-use crate::phantom::box_sums::{add_row, for_each_row_of_sums};
+use crate::phantom::box_sums::add_row;
 use crate::phantom::cell_context::CellContext;
 use crate::phantom::noise_fields::{FieldSampler, NoiseField, SIDE, Texels};
-use crate::phantom::parametric_shape::{make_irregular, perturbed_circle};
-use crate::phantom::tile::{Point, Tile, scaled_about};
+use crate::phantom::tile::{Point, Tile};
 use crate::random;
-use crate::scene::cell::CellDetail;
 
 /// Multiplies the thickness by clouds, flecks and the fine texture. `inner` is 1 in the endoplasm and 0 outside.
 pub(super) fn add_detail(
@@ -183,14 +181,6 @@ pub(super) fn add_cytoskeleton(
     Ok(())
 }
 
-/// Increase of the irregularity of the outline of a cell with its degeneration.
-const FRAYED: f64 = 0.5;
-
-/// Returns the amplitude of the irregularity of the outline, µm.
-pub(super) fn fray_um(detail: &CellDetail) -> f64 {
-    detail.fray_um * (1.0 + FRAYED * detail.degeneration)
-}
-
 /// Applies a linear thickness gradient: relative change per cell radius, in x and y.
 pub(super) fn apply_gradient(absorbance: &mut Tile, centre: Point, radius_px: f64, gradient: [f64; 2]) {
     if gradient == [0.0; 2] {
@@ -213,196 +203,11 @@ fn scale_row(row: &mut [f32], first: f32, step: f32) {
     }
 }
 
-/// Thins a zone of this width, px, along the outline of a cell; the factor is 1 farther inside. The remaining increase
-/// of the thickness, [`beyond_zone`], depends on the relative radius.
-pub(super) fn thin_rim(absorbance: &mut Tile, coverage: &Tile, distance_px: f64) {
-    let radius = random::count(distance_px);
-    if radius == 0 {
-        return;
-    }
-    // At a straight rim, the mean coverage of a box is 0.5. One radius inside the rim, it is 1.
-    let (width, side) = (coverage.width, 2 * radius + 1);
-    let weight = 1.0 / (side as f32 * side as f32);
-    let mut rows = absorbance.values.chunks_exact_mut(width);
-    for_each_row_of_sums(coverage, radius, |sums| {
-        if let Some(values) = rows.next() {
-            thin(values, sums, weight);
-        }
-    });
-}
-
-/// Standard deviation of the Gaussian that smooths the inside of a cell for [`slope_rim`], µm.
-const SLOPE_UM: f64 = 4.0;
-
-/// Largest relative decrease of the thickness at the rim. Set by eye, with single cells of Cervix93 as guide
-/// (docs/decisions.md, "Sloping rims").
-const SLOPE: f32 = 0.7;
-
-/// Standard deviation of the smoothing of the noise that makes some parts of the rim slope and others not, µm.
-const SLOPE_CHANGES_UM: f64 = 5.0;
-
-/// Thins a broad zone along parts of the rim, whose thickness increases gradually.
-pub(super) fn slope_rim(absorbance: &mut Tile, outline: &[Point], cell: &CellContext<'_>) {
-    if cell.body.detail.rim_um <= 0.0 {
-        return;
-    }
-    let (pixel_um, mut rng) = (cell.pixel_um(), cell.stream("slope"));
-    let mut zone = CoarseTile::smoothed(absorbance, outline, SLOPE_UM / pixel_um);
-    let sampler = FieldSampler::clouds(SLOPE_CHANGES_UM / pixel_um, &mut rng);
-    let mut noise = CoarseTile::noise(absorbance, cell.noise_fields.clouds(), &sampler);
-    let [mut smoothed, mut slopes] = [(); 2].map(|()| vec![0.0; absorbance.width]);
-    for (y, row) in absorbance.values.chunks_exact_mut(smoothed.len()).enumerate() {
-        zone.row_into(&mut smoothed, y);
-        noise.row_into(&mut slopes, y);
-        slope_row(row, &smoothed, &slopes);
-    }
-}
-
-/// Thins a row where `smoothed`, the smoothed inside of the cell, is below 1, in proportion to a slope between 0 and 1
-/// from noise.
-#[multiversion(targets = "simd")]
-fn slope_row(row: &mut [f32], smoothed: &[f32], noise: &[f32]) {
-    for ((value, smoothed), noise) in row.iter_mut().zip(smoothed).zip(noise) {
-        let beyond = (2.0 - 2.0 * smoothed).clamp(0.0, 1.0);
-        *value *= 1.0 - SLOPE * beyond * (0.5 + 0.5 * noise).clamp(0.0, 1.0);
-    }
-}
-
-/// Returns the thickness of a sheet relative to the rest, at a distance from its rim in widths of the marginal zone.
-///
-/// At the rim of single cells of Cervix93, the absorbance increases as 1 − exp(−t/λ) with the distance t, where λ is
-/// 1.6 to 2.2 µm.
-pub(super) fn thinning(distance: f64) -> f64 {
-    1.0 - libm::exp(-2.0 * distance.max(0.0))
-}
-
-/// Returns the part of [`thinning`] that changes only beyond the marginal zone.
-pub(super) fn beyond_zone(distance: f64) -> f64 {
-    thinning(distance.max(1.0))
-}
-
-/// Coefficients of the polynomial u(a + bu + cu²), which differs from [`thinning`] in the marginal zone, relative to
-/// its inner border, by 0.01 at most.
-const ZONE: [f32; 3] = [2.262_7, -1.94, 0.677_3];
-
-/// Multiplies values by a factor that increases from 0 at the rim to 1 at one radius inside: [`ZONE`].
-#[multiversion(targets = "simd")]
-fn thin(values: &mut [f32], sums: &[f32], weight: f32) {
-    for (value, sum) in values.iter_mut().zip(sums) {
-        let inside = (2.0 * weight * sum - 1.0).clamp(0.0, 1.0);
-        *value *= inside * (ZONE[0] + inside * (ZONE[1] + inside * ZONE[2]));
-    }
-}
-
-/// Radius of the region where the nucleus lifts the sheet, relative to the nucleus radius.
-const LIFTED: f64 = 2.4;
-
-/// Increase of thickness at the nucleus, relative to the density of the endoplasm. Single normal cells of Cervix93
-/// hardly become thicker towards the nucleus within the endoplasm.
-const LIFT: f32 = 0.3;
-
-/// Steps of a radial ramp.
-const STEPS: usize = 6;
-
-/// Returns a ramp: 1 inside a polygon scaled by `inner` about `centre`, 0 outside the polygon scaled by `outer`, with
-/// equal steps between.
-pub(super) fn ramp(like: &Tile, polygon: &[Point], centre: Point, inner: f64, outer: f64) -> Tile {
-    let scaled = |step: usize| {
-        let factor = inner + (outer - inner) * (step as f64 + 0.5) / STEPS as f64;
-        scaled_about(polygon, centre, factor)
-    };
-    let mut ramp = like.blank();
-    ramp.add_covers((0..STEPS).map(scaled), 1.0 / STEPS as f32);
-    ramp
-}
-
-/// Adds the endoplasm: the inner part of the cytoplasm, denser than the outer part. Returns its zone: 1 inside, 0
-/// outside.
-pub(super) fn add_endoplasm(
-    absorbance: &mut Tile,
-    outline: &[Point],
-    nucleus: Point,
-    cell: &CellContext<'_>,
-) -> Option<CoarseTile> {
-    let body = cell.body;
-    if body.detail.endoplasm <= 0.0 {
-        return None;
-    }
-    let (pixel_um, rng) = (cell.pixel_um(), &mut cell.stream("endoplasm"));
-    let size = random::between(INNER_SIZE[0], INNER_SIZE[1], rng);
-    let sigma_px = random::between(INNER_SOFTNESS[0], INNER_SOFTNESS[1], rng) * body.radius_um / pixel_um;
-    // The zone is smooth, so that every second point is sufficient.
-    let around = outline.iter().step_by(2).map(|p| [0, 1].map(|axis| size * (p[axis] - nucleus[axis])));
-    let mut zone: Vec<Point> = around.collect();
-    make_irregular(&mut zone, INNER_IRREGULARITY, rng);
-    let zone: Vec<Point> = zone.iter().map(|p| [p[0] + nucleus[0], p[1] + nucleus[1]]).collect();
-    let mut inner = CoarseTile::smoothed(absorbance, &zone, sigma_px);
-    // Densest where the nucleus lifts the sheet.
-    let radius = body.nucleus.radius_um / pixel_um;
-    let round = perturbed_circle(radius, 0.15, 0.15, rng);
-    let round: Vec<Point> = round.iter().map(|p| [p[0] + nucleus[0], p[1] + nucleus[1]]).collect();
-    let near = Tile::around(&scaled_about(&round, nucleus, LIFTED), 1.0);
-    let lifted = ramp(&near, &round, nucleus, 1.0, LIFTED);
-    let lift = LIFT * body.detail.endoplasm as f32;
-    absorbance.blend(&lifted, |values, ramp| {
-        values.iter_mut().zip(ramp).for_each(|(value, ramp)| *value *= 1.0 + lift * ramp);
-    });
-    let density = body.detail.endoplasm as f32;
-    let mut inside = vec![0.0_f32; absorbance.width];
-    for (y, row) in absorbance.values.chunks_exact_mut(inside.len()).enumerate() {
-        inner.row_into(&mut inside, y);
-        thicken(row, &inside, INNER * density);
-    }
-    Some(inner)
-}
-
-/// Size of the zone of the endoplasm relative to the cell: minimum, maximum. This and the next two were set by eye.
-const INNER_SIZE: [f64; 2] = [0.45, 0.75];
-
-/// Standard deviation of the Gaussian that smooths the zone, relative to the radius of the cell: minimum, maximum.
-const INNER_SOFTNESS: [f64; 2] = [0.1, 0.3];
-
-/// Irregularity of the outline of the zone: see [`make_irregular`].
-const INNER_IRREGULARITY: f64 = 0.12;
-
-/// Increase of thickness in the endoplasm relative to its density. In fields with the endoplasm of version 31, matched
-/// to normal fields of Cervix93, the absorbance of single cells relative to its median, which includes the endoplasm,
-/// rises from 0.95 at a fifth of the way from the rim to the centre to 1.2 or 1.3 in the inner half. In 26 real cells,
-/// it rises from 0.9 to 1.2 or 1.3.
-const INNER: f32 = 1.4;
-
-/// Thickens a row by the density of the endoplasm where it is inside.
-#[multiversion(targets = "simd")]
-fn thicken(row: &mut [f32], inside: &[f32], density: f32) {
-    for (value, inside) in row.iter_mut().zip(inside) {
-        *value *= 1.0 + inside * density;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::key::Key;
     use crate::phantom::noise_fields::NoiseFieldGenerator;
-    use crate::phantom::tile::tests::{at, disc};
-
-    #[test]
-    fn thin_rim_matches_the_local_mean_of_the_coverage() {
-        let mut cover = Tile { origin: [3, -7], width: 31, values: vec![0.0; 31 * 27] };
-        cover.cover(&disc([17.0, 5.0], 11.0));
-        let radius = 4_i64;
-        let mut thin = Tile { values: vec![1.0; 31 * 27], ..cover.clone() };
-        thin_rim(&mut thin, &cover, 4.0);
-        thin.for_each(|p, found| {
-            let [x, y] = p.map(|at| at as i64);
-            let around = (y - radius..=y + radius).flat_map(|y| (x - radius..=x + radius).map(move |x| [x, y]));
-            let sum: f64 = around.map(|p| f64::from(at(&cover, p))).sum();
-            let inside = (2.0 * sum / 81.0 - 1.0).clamp(0.0, 1.0);
-            let [a, b, c] = ZONE.map(f64::from);
-            let expected = inside * (a + inside * (b + inside * c));
-            assert!((f64::from(*found) - expected).abs() < 1e-5, "{x} {y}: {found}");
-        });
-    }
 
     #[test]
     fn clouds_are_limited_and_have_the_deviation_and_skewness_that_are_documented() {
@@ -420,22 +225,6 @@ mod tests {
         assert!((0.9..1.1).contains(&skewness), "{skewness}");
         // 1.7 + 0.35 · 1.7² − 0.296
         assert!(deviations.iter().all(|d| *d < 2.42));
-    }
-
-    #[test]
-    fn folded_and_other_cells_become_thin_over_the_same_distance() {
-        let (radius, edge) = (6, 20.0);
-        let mut cover = Tile { origin: [0, 0], width: 60, values: vec![0.0; 60 * 41] };
-        cover.cover(&[[edge, -1.0], [70.0, -1.0], [70.0, 50.0], [edge, 50.0]]);
-        let mut thin = Tile { values: vec![1.0; 60 * 41], ..cover.clone() };
-        thin_rim(&mut thin, &cover, f64::from(radius));
-        for x in 20..40 {
-            let found = f64::from(at(&thin, [x, 20]));
-            let distance = (x as f64 - edge) / (f64::from(radius) + 0.5);
-            let found = found * beyond_zone(distance);
-            assert!((found - thinning(distance)).abs() < 0.01, "{x}: {found} {}", thinning(distance));
-        }
-        assert!(thinning(0.0) == 0.0 && (thinning(5.0) - 1.0).abs() < 1e-4);
     }
 
     #[test]
@@ -465,23 +254,6 @@ mod tests {
     }
 
     #[test]
-    fn a_ramp_is_the_mean_of_scaled_coverages() {
-        let like = Tile { origin: [-20, -20], width: 41, values: vec![0.0; 41 * 41] };
-        let (polygon, centre) = (disc([1.0, 0.5], 12.0), [0.0, 0.0]);
-        let ramp = ramp(&like, &polygon, centre, 0.6, 1.4);
-        let mut mean = like.blank();
-        for step in 0..STEPS {
-            let mut cover = like.blank();
-            cover.cover(&scaled_about(&polygon, centre, 0.6 + 0.8 * (step as f64 + 0.5) / STEPS as f64));
-            mean.values.iter_mut().zip(&cover.values).for_each(|(mean, share)| *mean += share / STEPS as f32);
-        }
-        for (a, b) in ramp.values.iter().zip(&mean.values) {
-            assert!((a - b).abs() < 1e-5, "{a} {b}");
-        }
-        assert!((ramp.values[20 * 41 + 20] - 1.0).abs() < 1e-5);
-    }
-
-    #[test]
     fn the_fields_of_clouds_have_variance_1_together() {
         let generator = NoiseFieldGenerator::new();
         let noise_fields = generator.fields(Key { seed: 6, index: 0 });
@@ -501,15 +273,6 @@ mod tests {
         // One field of finite size has another variance than the mean of all fields.
         let count = 400.0 * 300.0;
         assert!((together / each - 1.0).abs() < 0.05 && (each / count - 1.0).abs() < 0.1, "{together} {each} {count}");
-    }
-
-    #[test]
-    fn a_sloping_rim_is_thin_at_the_outline_and_unchanged_inside() {
-        // Smoothed, the inside is 0.5 at a straight outline.
-        let smoothed = [0.5, 0.75, 1.0, 1.0, 0.5];
-        let mut row = [1.0; 5];
-        slope_row(&mut row, &smoothed, &[1.0, 1.0, 1.0, -1.0, -1.0]);
-        assert_eq!(row, [1.0 - SLOPE, 1.0 - 0.5 * SLOPE, 1.0, 1.0, 1.0]);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The halo of a koilocyte.
 
-use super::detail::ramp;
+use super::endoplasm::ramp;
 use crate::key::Stream;
 use crate::phantom::cell_context::CellContext;
 use crate::phantom::parametric_shape::perturbed_circle;

@@ -6,10 +6,12 @@ use cloth_verlet::{Crease, FoldKind, PixelGrid, Sheet, SheetSpec, Wave, crease_o
 mod coarse_tile;
 mod degeneration;
 mod detail;
+mod endoplasm;
 mod fine_texture;
 mod halo;
 mod outline;
 mod ridges;
+mod rim;
 mod specks;
 mod wrinkles;
 
@@ -86,7 +88,7 @@ fn outline(cell: &CellContext<'_>, class: &ClassAssets, centre: Point) -> Result
     let outline: Vec<Point> = outline.iter().map(about).map(|[x, y]| [x + centre[0], y + centre[1]]).collect();
     let detail = &cell.body.detail;
     let shaped = outline::shaped(outline, detail, &mut cell.stream("outline.corners"));
-    Ok(outline::wavy(shaped, detail::fray_um(detail), cell.pixel_um(), &mut cell.stream("outline.waves")))
+    Ok(outline::wavy(shaped, outline::fray_um(detail), cell.pixel_um(), &mut cell.stream("outline.waves")))
 }
 
 /// Returns the creases along which a cell is folded.
@@ -192,7 +194,13 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
                 let on_crease = plan.creases.iter().any(|crease| crease.distance_beyond(p) > 0.0);
                 if on_crease { 0.0 } else { wrinkles.roughness(p, pixel_um) }
             };
-            outline::roughened(p, detail::fray_um(&body.detail) / pixel_um, RIM_STEP_UM / pixel_um, roughness, &mut rng)
+            outline::roughened(
+                p,
+                outline::fray_um(&body.detail) / pixel_um,
+                RIM_STEP_UM / pixel_um,
+                roughness,
+                &mut rng,
+            )
         })
         .collect();
     let mut coverage = Tile::around(rough.iter().flatten(), 3.0);
@@ -216,24 +224,24 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
             }
             let view =
                 PixelGrid { origin: [absorbance.origin[0] as f64, absorbance.origin[1] as f64], pixel_size: 1.0 };
-            let thinning = if folded { detail::thinning } else { detail::beyond_zone };
+            let thinning = if folded { rim::thinning } else { rim::beyond_zone };
             sheet.thickness_into(&mut absorbance.values, coverage.width, &view, |radius| {
                 thinned(1.0 - radius, thinning)
             });
             ridges::limit_ridges(&mut absorbance, body.detail.ridges, pixel_um);
         }
         None => flat(&mut absorbance, &coverage, plan.centre, body.radius_um / pixel_um, |depth| {
-            thinned(depth, detail::beyond_zone)
+            thinned(depth, rim::beyond_zone)
         }),
     }
     detail::apply_gradient(&mut absorbance, plan.centre, body.radius_um / pixel_um, body.detail.thickness_gradient);
     let rim_um = if folded { body.detail.rim_um.min(FOLD_EDGE_UM) } else { body.detail.rim_um };
-    detail::thin_rim(&mut absorbance, &coverage, rim_um / pixel_um);
-    detail::slope_rim(&mut absorbance, &plan.outline, cell);
+    rim::thin_rim(&mut absorbance, &coverage, rim_um / pixel_um);
+    rim::slope_rim(&mut absorbance, &plan.outline, cell);
     let nucleus = [0, 1].map(|axis| plan.centre[axis] + body.nucleus.off_centre[axis] * body.radius_um / pixel_um);
     let mut canvas = vec![0.0; absorbance.values.len() + wrinkles::LANES];
     wrinkles.add(&mut absorbance, &coverage, &mut canvas);
-    let inner = detail::add_endoplasm(&mut absorbance, &plan.outline, nucleus, cell);
+    let inner = endoplasm::add_endoplasm(&mut absorbance, &plan.outline, nucleus, cell);
     halo::add_halo(&mut absorbance, nucleus, cell);
     detail::add_detail(&mut absorbance, &coverage, inner, cell, &mut rng)?;
     let lines = &mut canvas[..coverage.values.len()];

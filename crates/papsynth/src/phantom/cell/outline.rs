@@ -22,6 +22,14 @@ const BASE_WIDTH: [f64; 2] = [0.7, 2.2];
 /// Number of smoothing passes over an outline of 180 points: corners get a radius of about 1 µm.
 const SMOOTHING_PASSES: usize = 6;
 
+/// Increase of the irregularity of the outline of a cell with its degeneration.
+const FRAYED: f64 = 0.5;
+
+/// Returns the amplitude of the irregularity of the outline, µm.
+pub(super) fn fray_um(detail: &CellDetail) -> f64 {
+    detail.fray_um * (1.0 + FRAYED * detail.degeneration)
+}
+
 /// Returns the outline with the angularity, notches and protrusions of its cell, with the same area and centroid.
 ///
 /// Changes that would make the outline cross itself are skipped.
