@@ -2,12 +2,15 @@
 
     nucleus_net.py --train SET [SET ...] --test FOLDER --out RESULT.json [--mask IMAGE MASK] [--steps N] [--seed N]
                    [--weights FILE]
+    nucleus_net.py --mean WEIGHTS [WEIGHTS ...] --test FOLDER --out RESULT.json [--mask IMAGE MASK]
 
 A SET is a data set of `papsynth generate`, or a folder of data sets, of which the masks of nuclei are learned, or a
 folder of PNG and CSV files with the centres of nuclei (y, x), of which discs are learned. SET:N uses N fields, evenly
 spread over its files. Each batch has equally many crops of all SETs; the last 60 % of the steps use the last SET alone,
 so that a network that learns from synthetic and real fields ends with real ones. In data sets, a part of the crops show
 objects that look like nuclei, and their pixels count as much as those of nuclei.
+
+--mean tests the mean probability of networks that were trained before.
 
 Leukocytes that touch a cell do not count: many cannot be told from nuclei, and a network that learns them as
 background misses nuclei near the rims of cells.
@@ -35,16 +38,16 @@ from scipy.optimize import linear_sum_assignment
 from skimage.morphology import local_maxima, reconstruction
 from skimage.segmentation import watershed
 
-SIDE, BATCH = 192, 8  # of the crops of a batch
+SIDE, BATCH = 192, 8  # side of a crop, pixels; crops of a batch
 DISC = 10  # radius of the discs at annotated centres, pixels
 REACH = 12  # largest distance of a detection from a nucleus, pixels
 THRESHOLD = 0.7  # probability of detections, chosen on the half of the fields that a recipe is matched to
 MASK_THRESHOLD = 0.5  # probability of masks
 SMALLEST = 60  # area of a detection, pixels
-BORDER = 2  # regions this near to the border of the image are at it, pixels: the network decides pairs of pixels
+BORDER = 2  # width of the border of the image, pixels: a region can end one pixel before it, at half of the resolution
 NECK = 0.5  # least depth of a neck at which a region is split, pixels; chosen on the same half
 EMPTY = 0.96  # least light of the empty slide, relative to its mean there: cytoplasm and specks are darker
-FITS = 5  # of the light of the empty slide
+FITS = 5  # number of fits of the light of the empty slide
 MIN_EMPTY = 10  # pixels of the empty slide in a ninth of the image, at an eighth of the resolution
 MIN_PARTS = 7  # ninths of the image that have so many, so that the light of the empty slide is fitted
 DIMMEST, BRIGHTEST = 0.8, 1.05  # limits of that light, relative to the bright parts of the image
@@ -55,7 +58,7 @@ LAST = 0.6  # part of the steps in which only the last set is used
 CYTOPLASM, SHRED, LEUKOCYTE = (1, 2), 4, 5  # semantic classes; shreds and leukocytes look like nuclei
 MIMIC_CROPS = 0.35  # share of the crops that are chosen to show such objects
 NUCLEUS_WEIGHT = 3.0  # of pixels of nuclei, and of objects that look like them
-GAMMA = 1.4  # largest exponent on the darkness of crops, relative to the empty slide
+GAMMA = 1.4  # largest exponent on the darkness of crops; the smallest is 1 / GAMMA
 FIXED = 0.3  # darkness that this exponent does not change
 UNEVEN = 0.03  # standard deviation of the unevenness of light
 NOISE = 0.03  # largest standard deviation of the noise
@@ -64,7 +67,7 @@ SURROUNDINGS = 3  # width of the surroundings, pixels
 
 
 def normalized(image):
-    """Return the light relative to the empty slide, minus 1."""
+    """Return the light relative to the empty slide, minus 1: an array of the size of the image, -1 (dark) to 0.3."""
     grey = np.asarray(image.convert("L") if image.mode in ("RGB", "RGBA", "P") else image, dtype=np.float32)
     return np.clip(grey / empty_slide(grey), 0, 1.3) - 1
 
@@ -148,13 +151,13 @@ def load(name):
             np.asarray(Image.open(next((file.parent.parent / "labels" / part).glob(f"{file.stem}.*"))))
             for part in ("nucleus", "semantic")
         )
-        border = np.zeros(labels.shape, bool)
+        contact = np.zeros(labels.shape, bool)
         for axis in (0, 1):
             pair = [np.take(labels, range(s, labels.shape[axis] - 1 + s), axis) for s in (0, 1)]
             touching = (pair[0] != pair[1]) & (pair[0] > 0) & (pair[1] > 0)
-            border |= np.pad(touching, [(1, 0) if a == axis else (0, 0) for a in (0, 1)])
+            contact |= np.pad(touching, [(1, 0) if a == axis else (0, 0) for a in (0, 1)])
         ignored = at_cells(classes)
-        masks = (labels > 0) & ~border, np.isin(classes, (SHRED, LEUKOCYTE)) & ~ignored, ignored & (labels == 0)
+        masks = (labels > 0) & ~contact, np.isin(classes, (SHRED, LEUKOCYTE)) & ~ignored, ignored & (labels == 0)
         fields.append((normalized(Image.open(file)), *(mask.astype(np.float32) for mask in masks)))
     return fields
 
@@ -240,16 +243,20 @@ def train(sets, steps, seed):
     return net
 
 
-def probability(net, image):
-    """Return the probability of nucleus of every pixel: the mean over the image turned and mirrored in all ways."""
+def probability(nets, image):
+    """Return the probability of nucleus of every pixel, 0 to 1.
+
+    It is the mean over the networks, and over the image turned and mirrored in all ways.
+    """
     total = np.zeros(image.shape, np.float32)
-    for turns, step in itertools.product(range(4), (1, -1)):
+    views = list(itertools.product(range(4), (1, -1)))
+    for net, (turns, step) in itertools.product(nets, views):
         view = np.rot90(image[::step], turns)
         margin = [(0, -size % 32) for size in view.shape]
         padded = np.pad(view, margin, mode="reflect")[None, ..., None].astype(np.float32) * CONTRAST
         found = tf.sigmoid(net(padded, training=False)).numpy()[0, : view.shape[0], : view.shape[1], 0]
         total += np.rot90(found, -turns)[::step]
-    return total / 8
+    return total / (len(nets) * len(views))
 
 
 def at_border(regions):
@@ -266,12 +273,12 @@ def away_from_border(mask):
     return mask & ~np.isin(regions, at_border(regions))
 
 
-def detections(found):
-    """Return the centres of the nuclei above the threshold, and which of them are at the border of the image.
+def detections(probabilities):
+    """Return the centres (y, x) of the nuclei above the threshold, and which of them are at the border of the image.
 
     Regions are split at their necks: overlapping nuclei have one region.
     """
-    mask = ndimage.binary_opening(found > THRESHOLD, iterations=2)
+    mask = ndimage.binary_opening(probabilities > THRESHOLD, iterations=2)
     depth = ndimage.gaussian_filter(ndimage.distance_transform_edt(mask), 1)
     # Rounded, so that peaks of the same height are one if no neck lies between them.
     tops = local_maxima(np.round(reconstruction(depth - NECK, depth), 6)) & mask
@@ -294,20 +301,20 @@ def matched(found, true):
     return result
 
 
-def counts(found, true):
+def counts(probabilities, true):
     """Return the numbers of found nuclei, of detections and of annotated nuclei of a field."""
-    places, border = detections(found)
+    places, border = detections(probabilities)
     right = matched(places, true)
     return {"matched": int(right.sum()), "detected": int((right | ~border).sum()), "nuclei": len(true)}
 
 
-def dice(net, image, mask):
+def dice(nets, image, mask):
     """Return the Dice coefficient of a mask, at each scale of the image. Nuclei at the border are left out."""
     scores = []
     for scale in SCALES:
-        found = ndimage.zoom(probability(net, ndimage.zoom(image, scale, order=1)), 1 / scale, order=1)
-        height, width = (min(sizes) for sizes in zip(found.shape, mask.shape))
-        found = away_from_border(found[:height, :width] > MASK_THRESHOLD)
+        probabilities = ndimage.zoom(probability(nets, ndimage.zoom(image, scale, order=1)), 1 / scale, order=1)
+        height, width = (min(sizes) for sizes in zip(probabilities.shape, mask.shape))
+        found = away_from_border(probabilities[:height, :width] > MASK_THRESHOLD)
         true = away_from_border(mask[:height, :width] > 0)
         scores.append(float(2 * (found & true).sum() / max(found.sum() + true.sum(), 1)))
     return scores
@@ -320,9 +327,26 @@ def use_bfloat16():
         tf.keras.mixed_precision.set_global_policy("mixed_bfloat16")
 
 
+def networks(options, parser):
+    """Return the network that is trained on the sets, or the networks of which weights are given."""
+    if options.mean:
+        nets = [network() for _ in options.mean]
+        for net, file in zip(nets, options.mean):
+            if not Path(file).is_file():
+                parser.error(f"{file}: no such file; expected weights that --weights has written")
+            net.load_weights(file)
+        return nets
+    sets = [load(name) for name in options.train]
+    if not all(sets) or any(min(image.shape) < SIDE for fields in sets for image, *_ in fields):
+        parser.error(f"each training set needs at least one field, of at least {SIDE} pixels")
+    return [train(sets, options.steps, options.seed)]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--train", nargs="+", required=True)
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument("--train", nargs="+", metavar="SET")
+    source.add_argument("--mean", nargs="+", metavar="WEIGHTS")
     parser.add_argument("--test", type=Path, required=True)
     parser.add_argument("--mask", nargs=2, type=Path)
     parser.add_argument("--steps", type=int, default=3000)
@@ -330,23 +354,20 @@ def main():
     parser.add_argument("--weights", help="file to which the weights are written, .weights.h5")
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
-    sets = [load(name) for name in options.train]
-    if not all(sets) or any(min(image.shape) < SIDE for fields in sets for image, *_ in fields):
-        parser.error(f"each training set needs at least one field, of at least {SIDE} pixels")
     use_bfloat16()
-    net = train(sets, options.steps, options.seed)
-    result = {"train": options.train, "steps": options.steps, "seed": options.seed, "fields": []}
+    nets = networks(options, parser)
+    result = {"train": options.train, "mean": options.mean, "steps": options.steps, "seed": options.seed, "fields": []}
     for row in csv.DictReader((options.test / "frames.csv").open()):
         file = options.test / f"{row['frame']}.png"
-        found = counts(probability(net, normalized(Image.open(file))), centres(file.with_suffix(".csv")))
+        found = counts(probability(nets, normalized(Image.open(file))), centres(file.with_suffix(".csv")))
         result["fields"].append({"frame": row["frame"], "grade": row["grade"].strip(), **found})
     if options.mask:
         image, mask = (Image.open(file) for file in options.mask)
         mask = np.asarray(mask)
-        result["dice"] = dice(net, normalized(image), mask if mask.ndim == 2 else mask[..., 0])
+        result["dice"] = dice(nets, normalized(image), mask if mask.ndim == 2 else mask[..., 0])
         result["scales"] = SCALES
-    if options.weights:
-        net.save_weights(options.weights)
+    if options.weights and options.train:
+        nets[0].save_weights(options.weights)
     partial = options.out.with_suffix(".partial")
     partial.write_text(json.dumps(result, indent=1))
     partial.replace(options.out)

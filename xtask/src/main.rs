@@ -85,12 +85,12 @@ enum DevCommand {
         #[arg(value_name = "FIGURE", value_parser = figures::names())]
         wanted: Vec<String>,
     },
-    /// Fits recipes to one half of the real fields, and compares synthetic fields with the other half
+    /// Matches recipes to each half of the real fields, and compares their fields with both halves
     ///
-    /// Needs PAPSYNTH_REFERENCE. Every second field of each grade is used by `papsynth match`, the others by `papsynth
-    /// judge`, for the default and the matched recipes. A random forest trained on pixels of synthetic fields segments
-    /// the nuclei of a real field (scikit-learn). Writes reports and a table to target/realism, and prints the table.
-    /// Takes about half an hour on 2 cores.
+    /// Needs PAPSYNTH_REFERENCE. For each half of the fields of a grade, `papsynth match` fits a recipe, and `papsynth
+    /// judge` compares fields of it with both halves; fields of the presets are compared in the same way. A random
+    /// forest trained on pixels of synthetic fields segments the nuclei of a real field (scikit-learn). Writes reports
+    /// and a table to target/realism, and prints the table. Takes about half an hour on 2 cores.
     Realism {
         /// Uses fewer simulations: a third of the time
         #[arg(long)]

@@ -11,7 +11,7 @@ use crate::workspace::Workspace;
 use crate::{dataset, python};
 
 /// Pixel size of the real fields, µm.
-pub(crate) const PIXEL_UM: &str = "0.33";
+const PIXEL_UM: &str = "0.33";
 
 /// Number of fields generated for each comparison.
 const FRAMES: &str = "16";
@@ -27,9 +27,7 @@ pub(crate) const GRADES: [(&str, &str, &str); 3] =
     [("N", "negative", "extended-focus"), ("L", "low-grade lesion", "lsil"), ("H", "high-grade lesion", "high-grade")];
 
 pub(crate) fn run(workspace: &Workspace, quick: bool) -> Result<()> {
-    let Some(reference) = std::env::var_os("PAPSYNTH_REFERENCE").map(PathBuf::from) else {
-        return Err(skipped("PAPSYNTH_REFERENCE is not set, so there are no real fields"));
-    };
+    let reference = reference()?;
     let folder = workspace.target.join("realism");
     shell::make(&folder)?;
     let halves = halves(&reference.join("cervix93"), &folder)?;
@@ -38,13 +36,11 @@ pub(crate) fn run(workspace: &Workspace, quick: bool) -> Result<()> {
     for (grade, name, preset) in GRADES {
         for half in [0, 1] {
             let matched = matched(grade, half);
-            let mut fit = program(workspace);
-            fit.args(["match", "--pixel-um", PIXEL_UM, "--group", grade, "--preset", preset, "--force", "--out"]);
-            fit.arg(&matched).arg(&halves[half]);
+            let mut fit = fit(workspace, grade, preset, &halves[half], &matched);
             if quick {
                 fit.arg("--quick");
             }
-            shell::run(&mut fit)?;
+            shell::run(fit.arg("--force"))?;
             let mut recipes = vec![("matched", vec![matched])];
             if half == 0 {
                 recipes.push(("preset", vec!["--preset".into(), preset.into()]));
@@ -90,10 +86,24 @@ pub(crate) fn program(workspace: &Workspace) -> Command {
     command
 }
 
+/// Returns the folder of the real fields.
+pub(crate) fn reference() -> Result<PathBuf> {
+    let folder = std::env::var_os("PAPSYNTH_REFERENCE").map(PathBuf::from);
+    folder.ok_or_else(|| skipped("PAPSYNTH_REFERENCE is not set, so there are no real fields"))
+}
+
+/// Returns the command that matches a recipe to the fields of a grade in a folder.
+pub(crate) fn fit(workspace: &Workspace, grade: &str, preset: &str, fields: &Path, recipe: &Path) -> Command {
+    let mut command = program(workspace);
+    command.args(["match", "--pixel-um", PIXEL_UM, "--group", grade, "--preset", preset, "--out"]);
+    command.arg(recipe).arg(fields);
+    command
+}
+
 /// Writes two folders, each with every second field of each grade and its annotations.
 pub(crate) fn halves(fields: &Path, folder: &Path) -> Result<[PathBuf; 2]> {
     let text = shell::read(&fields.join("frames.csv"))?;
-    let halves = ["fit", "judge"].map(|name| folder.join(name));
+    let halves = ["half-1", "half-2"].map(|name| folder.join(name));
     for (which, half) in halves.iter().enumerate() {
         shell::remove(half)?;
         shell::make(half)?;

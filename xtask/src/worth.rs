@@ -1,14 +1,14 @@
 //! Trains a small network on synthetic and on real fields, and tests it on other real fields.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 
-use crate::realism::{GRADES, PIXEL_UM, halves, program};
-use crate::shell::{self, skipped};
+use crate::realism::{GRADES, halves, program};
 use crate::workspace::Workspace;
-use crate::{dataset, python};
+use crate::{dataset, python, realism, shell};
 
 /// Packages of the network.
 const PACKAGES: &str = "numpy\npillow\nscikit-image\nscipy\n\
@@ -62,9 +62,10 @@ const OVERLAP_TESTS: [(&str, &str, &str); 2] = [("extended-focus", "60", "4"), (
 ///
 /// Needs PAPSYNTH_REFERENCE. `papsynth match` fits a recipe to every second real field of each grade; a U-Net is
 /// trained on fields of the three recipes, on those real fields, or on both, and finds the nuclei of the other half.
-/// Then the halves change places. Every training and its weights are written to target/worth, where an interrupted run
-/// continues; a table is printed. Delete target/worth after a change of papsynth. Each training takes eight minutes on
-/// one core; all of them take six hours. docs/WORTH.md tells what was measured.
+/// The mean of the first two networks is tested too. Then the halves change places. Every training and its weights are
+/// written to target/worth, where an interrupted run continues; a table is printed. Delete target/worth after a change
+/// of papsynth. Each training takes eight minutes on one core; all of them take six hours. docs/WORTH.md tells what was
+/// measured.
 ///
 /// With --overlap: trains networks on complete masks of overlapping cells, and tests them on synthetic fields of other
 /// presets. Prints the Dice coefficients of found cells and the share of missed cells. Needs no real fields.
@@ -84,14 +85,14 @@ pub(crate) struct Worth {
     widen: String,
     /// Also trains on another set: a data set of papsynth, or a folder of PNG files and CSV files with centres (y, x);
     /// repeatable
-    #[arg(long, value_name = "NAME=FOLDER", value_parser = other)]
+    #[arg(long, value_name = "NAME=FOLDER", value_parser = parse_other)]
     other: Vec<(String, PathBuf)>,
-    /// Only trains on these sets, such as `synthetic`, and names them in the table
+    /// Only trains these networks, such as `synthetic`; the table has all that are trained so far
     #[arg(long, value_name = "NAME")]
     only: Vec<String>,
 }
 
-fn other(text: &str) -> Result<(String, PathBuf), String> {
+fn parse_other(text: &str) -> Result<(String, PathBuf), String> {
     let word = |c: char| c.is_ascii_alphanumeric() || c == '_';
     match text.split_once('=') {
         Some((name, folder)) if !name.is_empty() && name.chars().all(word) && Path::new(folder).is_dir() => {
@@ -105,24 +106,22 @@ pub(crate) fn run(workspace: &Workspace, options: &Worth) -> Result<()> {
     if options.overlap {
         return overlap(workspace, options);
     }
-    let Some(reference) = std::env::var_os("PAPSYNTH_REFERENCE").map(PathBuf::from) else {
-        return Err(skipped("PAPSYNTH_REFERENCE is not set, so there are no real fields"));
-    };
+    let reference = realism::reference()?;
     let python = python::environment(workspace, "worth", PACKAGES)?;
     let folder = workspace.target.join("worth");
     let results = folder.join(format!("results-{METHOD}-{}-steps", options.steps));
     shell::make(&results)?;
     let halves = halves(&reference.join("cervix93"), &folder)?;
+    let result = |arm: &str, half: usize, seed: u32| results.join(format!("{arm}-{half}-{seed}.json"));
+    let synthetic = |half: usize| folder.join(format!("synthetic-{METHOD}-{half}-{}", options.widen));
     let mut trainings = Vec::new();
     for half in [0, 1] {
-        let synthetic = synthetic(workspace, &folder, &halves[half], half, &options.widen)?;
-        let real = halves[half].display().to_string();
-        let synthetic = synthetic.display().to_string();
+        let [synthetic, real] = [&synthetic(half), &halves[half]].map(|set| set.display().to_string());
         let name = match options.widen.as_str() {
             WIDEN => "synthetic".to_owned(),
             factor => format!("synthetic_widened_{}", factor.replace('.', "_")),
         };
-        // The arguments after `--train` of each row of the table.
+        // The training sets of each row of the table.
         let mut arms = vec![
             (name.clone(), vec![synthetic.clone()]),
             ("real".to_owned(), vec![real.clone()]),
@@ -134,24 +133,36 @@ pub(crate) fn run(workspace: &Workspace, options: &Worth) -> Result<()> {
         ];
         arms.extend(options.other.iter().map(|(name, folder)| (name.clone(), vec![folder.display().to_string()])));
         for seed in 0..options.seeds {
-            trainings.extend(arms.iter().map(|(arm, arguments)| (seed, half, arm.clone(), arguments.clone())));
+            let train = |sets: &Vec<String>| [vec!["--train".to_owned()], sets.clone()].concat();
+            trainings.extend(arms.iter().map(|(arm, sets)| (seed, half, arm.clone(), train(sets))));
+            let weights = |arm: &str| weights(&result(arm, half, seed)).display().to_string();
+            let mean = vec!["--mean".to_owned(), weights(&name), weights("real")];
+            trainings.push((seed, half, format!("mean_of_{name}_and_real"), mean));
         }
+    }
+    let arms: BTreeSet<&str> = trainings.iter().map(|(_, _, arm, _)| arm.as_str()).collect();
+    if let Some(unknown) = options.only.iter().find(|name| !arms.contains(name.as_str())) {
+        bail!("--only {unknown}: no such network; expected one of {}", Vec::from_iter(arms).join(", "));
     }
     // The first seed of everything comes first, so that an interrupted run has a complete table.
     trainings.sort_by_key(|(seed, ..)| *seed);
     trainings.retain(|(_, _, arm, _)| options.only.is_empty() || options.only.contains(arm));
     let count = trainings.len();
     for (number, (seed, half, arm, arguments)) in trainings.into_iter().enumerate() {
-        let result = results.join(format!("{arm}-{half}-{seed}.json"));
+        let result = result(&arm, half, seed);
         if result.exists() {
             continue;
         }
+        let set = synthetic(half);
+        if arguments.contains(&set.display().to_string()) && !set.exists() {
+            generate(workspace, &folder, &halves[half], half, &options.widen, &set)?;
+        }
         println!("training {} of {count}: {arm}, half {}, seed {seed}", number + 1, half + 1);
         let mut command = Command::new(&python);
-        command.arg(workspace.root.join("xtask/python/nucleus_net.py")).arg("--train").args(arguments);
+        command.arg(workspace.root.join("xtask/python/nucleus_net.py")).args(arguments);
         command.arg("--test").arg(&halves[1 - half]).arg("--out").arg(&result);
         command.args(["--seed", &seed.to_string(), "--steps", &options.steps.to_string(), "--weights"]);
-        command.arg(result.with_extension("weights.h5")).arg("--mask");
+        command.arg(weights(&result)).arg("--mask");
         command.args(["extended_focus.png", "nuclei.png"].map(|name| reference.join("focus_stack").join(name)));
         shell::run(&mut command)?;
     }
@@ -160,6 +171,11 @@ pub(crate) fn run(workspace: &Workspace, options: &Worth) -> Result<()> {
     shell::write(&folder.join("table.md"), &table)?;
     println!("\n{table}\nTrainings: {}", workspace.shown(&results));
     Ok(())
+}
+
+/// Returns the file with the weights of a training.
+fn weights(result: &Path) -> PathBuf {
+    result.with_extension("weights.h5")
 }
 
 /// Trains networks on complete masks of cells, and tests them on synthetic fields of other presets.
@@ -194,21 +210,15 @@ fn overlap(workspace: &Workspace, options: &Worth) -> Result<()> {
     Ok(())
 }
 
-/// Returns a folder with two data sets of synthetic fields for each grade, matched to a half of the real ones.
-fn synthetic(workspace: &Workspace, folder: &Path, real: &Path, half: usize, widen: &str) -> Result<PathBuf> {
-    let out = folder.join(format!("synthetic-{METHOD}-{half}-{widen}"));
-    if out.exists() {
-        return Ok(out);
-    }
+/// Writes a folder with two data sets of synthetic fields for each grade, matched to a half of the real ones.
+fn generate(workspace: &Workspace, folder: &Path, real: &Path, half: usize, widen: &str, out: &Path) -> Result<()> {
     let partial = folder.join("partial");
     shell::remove(&partial)?;
     shell::make(&partial)?;
     for (number, ((grade, _, preset), frames)) in GRADES.into_iter().zip(FRAMES).enumerate() {
         let recipe = folder.join(format!("matched-{METHOD}-{grade}-{half}.toml"));
         if !recipe.exists() {
-            let mut fit = program(workspace);
-            fit.args(["match", "--pixel-um", PIXEL_UM, "--group", grade, "--preset", preset, "--out"]);
-            shell::run(fit.arg(&recipe).arg(real))?;
+            shell::run(&mut realism::fit(workspace, grade, preset, real, &recipe))?;
         }
         for (set, (name, leukocytes)) in LEUKOCYTES.into_iter().enumerate() {
             // With one seed for all, the data sets would have the same scenes.
@@ -217,10 +227,9 @@ fn synthetic(workspace: &Workspace, folder: &Path, real: &Path, half: usize, wid
             let words = words.into_iter().chain(["--without", "noise-free,layers,contact-sheet"]);
             let sets = VARIETY.iter().chain(leukocytes).flat_map(|set| ["--set", *set]);
             let words = words.chain(sets).map(PathBuf::from);
-            let out = partial.join(format!("{grade}-{name}"));
-            dataset::generate(program(workspace), &out, [recipe.clone()].into_iter().chain(words))?;
+            let set = partial.join(format!("{grade}-{name}"));
+            dataset::generate(program(workspace), &set, [recipe.clone()].into_iter().chain(words))?;
         }
     }
-    std::fs::rename(&partial, &out).with_context(|| format!("cannot write {}", out.display()))?;
-    Ok(out)
+    std::fs::rename(&partial, out).with_context(|| format!("cannot write {}", out.display()))
 }

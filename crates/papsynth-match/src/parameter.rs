@@ -94,9 +94,9 @@ parameters! {
     Noise: Measured, Field, Logarithmic 0.5..6.0 "dn", "camera.full_well_e, camera.read_noise_e: noise of the empty slide";
     /// Fraction of the noise variance that is the same in all images.
     Pattern: Simulated, All, Linear 0.0..0.8 "", "camera.prnu, camera.dsnu_e: part of the variance of noise";
-    /// Correlation of noise with the next pixel of the row, in fused images.
+    /// Correlation of noise with the next pixel of the row, in EDF images.
     NoiseCorrelationX: Measured, Field, Linear 0.0..0.45 "", "focus.noise_correlation_x";
-    /// Correlation of noise with the next pixel of the column, in fused images.
+    /// Correlation of noise with the next pixel of the column, in EDF images.
     NoiseCorrelationY: Measured, Field, Linear 0.0..0.45 "", "focus.noise_correlation_y";
     /// Pixel size; sought on request only.
     Pixel: Simulated, All, Logarithmic 0.15..0.75 "um", "field.pixel_um";

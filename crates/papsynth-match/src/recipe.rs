@@ -18,7 +18,7 @@ pub struct Setting {
     pub pixel_um: f64,
     /// Bits per pixel.
     pub bits: u32,
-    /// Whether noise is correlated between pixels, as in images of extended depth of field.
+    /// Whether noise is correlated between pixels, as in EDF images.
     pub extended: bool,
     /// Whether the pixel size is sought.
     pub seek_pixel: bool,

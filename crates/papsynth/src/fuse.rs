@@ -3,10 +3,10 @@
 //! Real EDF images were reduced from a sensor with smaller pixels by linear interpolation: this correlates the noise
 //! and lets its variance change periodically along rows and columns. Most of the noise is a fixed pattern of the
 //! camera, which is equal in all planes and so remains everywhere, less so in the dark. The rest is averaged on the
-//! empty slide, where a tenth of the variance is uncorrelated. In the dark and in structured regions, where the
-//! sharpest plane changes every few pixels, the rest is stronger and uncorrelated; on structure, short lines along rows
-//! and columns appear, as fusion by wavelets produces them (Forster et al. 2004, doi:10.1002/jemt.20092). Correlations,
-//! the period and lines were measured on real EDF images.
+//! empty slide, where a tenth of the variance is uncorrelated. In the dark it is less correlated. In structured
+//! regions, where the sharpest plane changes every few pixels, it is stronger and uncorrelated, and short lines along
+//! rows and columns appear, as fusion by wavelets produces them (Forster et al. 2004, doi:10.1002/jemt.20092).
+//! Correlations, the period and lines were measured on real EDF images.
 
 use multiversion::multiversion;
 
@@ -18,8 +18,8 @@ mod wavelet;
 
 /// Gives the noise, the difference between grey levels and expected grey levels, the properties of EDF images.
 ///
-/// The variance of the noise is unchanged, except just below the highest grey level, where the mean is lower too, on
-/// structure, and in the dark, apart from the pattern of columns. `input_top` is the grey level of the planes that
+/// The variance of the noise is unchanged, except just below the highest grey level, where the mean is lower too, and
+/// on structure, apart from the pattern of columns. `input_top` is the grey level of the planes that
 /// becomes the highest one of the image, `top`.
 pub(crate) fn correlate(
     grey: &mut [u16],
@@ -216,7 +216,7 @@ const DARK: f32 = 0.5;
 /// Amplitude of the lines along rows and columns in structured regions, relative to the noise filtered to such lines.
 const LINES: f32 = 2.6;
 
-/// Noise of a plane relative to that of the fused image: fitted to the decrease of noise just below the highest grey
+/// Noise of a plane relative to that of the EDF image: fitted to the decrease of noise just below the highest grey
 /// level of real EDF images, and to the histograms of their empty slide.
 const PLANE_NOISE: f64 = 2.2;
 
@@ -224,7 +224,7 @@ const PLANE_NOISE: f64 = 2.2;
 /// where its planes are clipped before fusion. `below` is the mean without clipping, negative above that level,
 /// and `sd` the standard deviation far below it.
 ///
-/// The fused image is the mean of the clipped planes for the noise that all planes share. Its variance is that of the
+/// The EDF image is the mean of the clipped planes for the noise that all planes share. Its variance is that of the
 /// first two Hermite polynomials of that noise.
 #[must_use]
 pub fn clipped_noise(below: f64, sd: f64) -> [f64; 2] {

@@ -4,4 +4,5 @@
 pub mod elementary;
 pub mod fourier;
 pub mod random;
+pub mod rounding;
 pub mod statistics;

@@ -12,10 +12,16 @@ const EXPLAINED: f64 = 0.98;
 /// Changes `images` linearly so that their covariance matrix is `own`, and their covariance matrix with `parents` is
 /// `cross`, with one row for each image: the paper's "adjustment of the correlations". All images have mean 0.
 ///
-/// The result is the regression on the parents, D B⁻¹ Z, plus a linear map M of the residuals X − A Z. Of all maps that
-/// give the required covariance T = C − D B⁻¹ Dᵀ, M is the one that changes the residuals least:
-/// M = E^(−1/2) (E^(1/2) T E^(1/2))^(1/2) E^(−1/2), where E is their covariance. If the parents would explain more than
-/// 98 % of the variance of a combination of images, its correlations are reduced.
+/// Let X be the images and Z the parents, one in each row, C the matrix `own` and D the matrix `cross`. B is the
+/// covariance matrix of Z, and A Z the regression of X on Z: A is the covariance matrix of X with Z, times B⁻¹.
+///
+/// The result is D B⁻¹ Z + M (X − A Z). The first term has the covariances D with the parents. The second one is a
+/// linear map M of the residuals X − A Z, which are uncorrelated with the parents, and has the rest of the covariance
+/// of the result, T = C − D B⁻¹ Dᵀ. Of all maps that give T, M is the one that changes the residuals least:
+/// M = E^(−1/2) (E^(1/2) T E^(1/2))^(1/2) E^(−1/2), where E is the covariance matrix of the residuals.
+///
+/// If the parents would explain more than 98 % of the variance of a combination of images, its correlations are
+/// reduced.
 pub(crate) fn impose(images: &mut [Vec<f32>], parents: &[Vec<f32>], own: &[f64], cross: &[f64]) {
     let (n, p) = (images.len(), parents.len());
     let Some(len) = images.first().map(Vec::len) else { return };
@@ -59,7 +65,7 @@ fn cheapest_map(from: &Matrix, to: &Matrix) -> Matrix {
     inverse.times(&root.times(to).times(&root).root()).times(&inverse)
 }
 
-/// Replaces the images X by M X + A Z.
+/// Replaces the images X by `map` X + `added` Z, where Z are the parents.
 fn apply(images: &mut [Vec<f32>], parents: &[Vec<f32>], map: &Matrix, added: &Matrix) {
     /// Pixels computed together, so that they stay in the cache.
     const TILE: usize = 4096;

@@ -39,7 +39,7 @@ pub enum Error {
         /// Width in pixels.
         width: usize,
     },
-    /// A pixel under the mask is NaN or infinite, or its square or fourth power may be infinite.
+    /// A pixel under the mask is NaN or out of the range −10⁶ to 10⁶.
     #[error("image[{index}] = {value}: expected a number from -1e6 to 1e6")]
     Pixel {
         /// Index of the pixel.

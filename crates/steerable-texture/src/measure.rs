@@ -34,7 +34,8 @@ impl Analyzer {
     ///
     /// # Errors
     ///
-    /// If a slice has the wrong length, the mask is empty or out of range, or a pixel under the mask is not finite.
+    /// If a slice has the wrong length, the mask is empty or out of range, or a pixel under the mask is NaN or out of
+    /// the range −10⁶ to 10⁶.
     pub fn measure(&self, image: &[f32], mask: Option<&[f32]>) -> Result<Statistics, Error> {
         let pyramid = &self.pyramid;
         let width = pyramid.width();

@@ -53,7 +53,7 @@ fn finite_or(value: f64, otherwise: f64) -> f64 {
     if value.is_finite() { value } else { otherwise }
 }
 
-/// The number of moments of an image that a cubic polynomial of it needs for its fourth moment, with the zeroth.
+/// Number of moments of the grey levels, of the orders 0 to 12: the fourth power of a cubic polynomial has degree 12.
 const COUNT: usize = 13;
 
 /// Replaces the grey levels x by a polynomial of them that gives the moments of `target`: first the skewness, along its

@@ -121,7 +121,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn defaults_are_the_papers() {
+    fn defaults_are_as_documented() {
         let SynthesisParams { texture, iterations } = SynthesisParams::default();
         assert_eq!(texture.pyramid, PyramidParams { scales: 4, orientations: 4 });
         assert_eq!((texture.neighbourhood, iterations), (7, 25));

@@ -95,9 +95,9 @@ impl Plane {
     }
 }
 
-/// Returns the pairs of columns with the same frequencies, fine and coarse, as indices of their first element: the
-/// lower half of the frequencies of a grid is that of a grid of half the size. Calls `copy` with the two ranges of
-/// each.
+/// Calls `copy` with each pair of ranges of a fine and a coarse spectrum that hold the same frequencies. The coarse
+/// grid has half the size, and its frequencies are the lower half of those of the fine grid. `[width, height]` is the
+/// size of the fine grid; each range is a part of a column.
 pub(crate) fn shared_columns(
     [width, height]: [usize; 2],
     mut copy: impl FnMut(core::ops::Range<usize>, core::ops::Range<usize>),

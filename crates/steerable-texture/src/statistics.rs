@@ -68,7 +68,7 @@ impl Statistics {
     /// # Errors
     ///
     /// If parameters are out of range, the slices have different lengths, the mask is empty or out of range, or a pixel
-    /// under the mask is not finite.
+    /// under the mask is NaN or out of the range −10⁶ to 10⁶.
     pub fn measure(image: &[f32], width: usize, mask: Option<&[f32]>, params: &TextureParams) -> Result<Self, Error> {
         params.check()?;
         crate::region::check(image, width, mask)?;

@@ -40,7 +40,7 @@ pub(crate) struct ImageInfo {
     pub(crate) height: usize,
     /// Pixel size, µm.
     pub(crate) pixel_um: f64,
-    /// Stage position of each plane, µm; empty for images of extended depth of field.
+    /// Stage position of each plane, µm; empty for EDF images.
     pub(crate) planes_um: Vec<f64>,
     pub(crate) levels: usize,
     /// Size of a tile, px.

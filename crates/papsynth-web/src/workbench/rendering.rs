@@ -323,7 +323,7 @@ fn image(
     }
     let all_um = scene.planes_um.clone();
     let middle = all_um.get(all_um.len() / 2).copied().unwrap_or_default();
-    // The sharpest plane of each object does not depend on the position of a fused image.
+    // The sharpest plane of each object does not depend on the position of an EDF image.
     let focus_um = asked.focus_um.filter(|um| um.is_finite() && scene.fusion.is_none());
     scene.planes_um = vec![focus_um.map_or(middle, |um| um.clamp(-MAX_FOCUS_UM, MAX_FOCUS_UM))];
     let image = live.image(&asked.recipe, scene.clone(), threads, cancellation)?;

@@ -4,6 +4,7 @@
 //! the cell in the ground truth has the trait `clue`.
 
 use multiversion::multiversion;
+use portable_numerics::rounding::round_to_count;
 
 use super::prelude::*;
 use crate::phantom::box_sums::averaged;
@@ -71,7 +72,7 @@ pub(crate) fn add_coat(coat: &Coat, context: &ObjectContext<'_>, phantom: &mut P
     let opposite = [corner[0] + (whole.width - 1) as f64, corner[1] + (whole.height() - 1) as f64];
     let mut canvas = ObjectCanvas::around(&[corner, opposite], margin);
     let inside = widened(&whole, &canvas.coverage);
-    let near = |um: f64| averaged(&inside, random::count(um / pixel_um).max(1));
+    let near = |um: f64| averaged(&inside, round_to_count(um / pixel_um).max(1));
     let (rim, beyond) = (near(RIM_UM), near(coat.overhang_um));
     // Beyond the rim, bacteria form tufts.
     let tufts = FieldSampler::clouds(TUFT_UM / pixel_um, &mut rng);
@@ -91,7 +92,7 @@ pub(crate) fn add_coat(coat: &Coat, context: &ObjectContext<'_>, phantom: &mut P
     });
     let origin = canvas.coverage.origin.map(|at| at as f64);
     let height = canvas.coverage.height();
-    let tries = random::count(coat.density * (width * height) as f64 * pixel_um * pixel_um);
+    let tries = round_to_count(coat.density * (width * height) as f64 * pixel_um * pixel_um);
     let half_width = 0.5 * coat.width_um / pixel_um;
     for _ in 0..tries {
         let (x, y) = (random::below(width, &mut rng), random::below(height, &mut rng));

@@ -21,7 +21,7 @@ section! {
 section! {
     /// Leukocytes (paper, section "White blood cells", Eqs. 6, 7, Fig. 9).
     ///
-    /// The defaults come from 24 extended-focus fields of liquid-based cytology with 0.33 µm per pixel. 51 single dark
+    /// The defaults come from 24 EDF fields of liquid-based cytology with 0.33 µm per pixel. 51 single dark
     /// bodies have these values at 10 %, 50 % and 90 %, with the outline at half of the contrast:
     ///
     /// - area 26, 39 and 51 µm², solidity 0.91, 0.92 and 0.94, eccentricity 0.36, 0.60 and 0.76;

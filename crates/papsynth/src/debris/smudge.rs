@@ -2,6 +2,8 @@
 
 mod folded;
 
+use portable_numerics::rounding::round_to_count;
+
 use super::prelude::*;
 use super::tuft::{Tuft, crop};
 
@@ -9,7 +11,7 @@ section! {
     /// Amorphous debris: granular clumps and fibrous shreds of remains of cells, mucus and bacteria, and folded shreds
     /// of cytoplasm without a nucleus.
     ///
-    /// In 24 extended-focus fields of liquid-based cytology, seven clumps per mm² have an absorbance of 0.22 or more.
+    /// In 24 EDF fields of liquid-based cytology, seven clumps per mm² have an absorbance of 0.22 or more.
     /// At 10 %, 50 % and 90 %, their absorbance is 0.23, 0.27 and 0.39, and their area at half of the contrast is 21,
     /// 44 and 115 µm². The eight normal fields have five dark
     /// folded shreds of 12 to 30 µm, counted by eye: about five per mm².
@@ -164,7 +166,7 @@ impl Smudge {
         let (radius, stretch) = (0.5 * self.diameter_um, self.elongation().sqrt());
         let [a, b] = [radius * stretch, radius / stretch];
         let bend = BEND * random::normal(rng);
-        let count = random::count((2.0 * b / FIBRE_DISTANCE_UM).clamp(FIBRES[0], FIBRES[1]));
+        let count = round_to_count((2.0 * b / FIBRE_DISTANCE_UM).clamp(FIBRES[0], FIBRES[1]));
         let fibres: Vec<(Vec<Point>, f64)> = (0..count)
             .map(|_| {
                 let (from, across) = (0.3 * a * random::normal(rng), b * random::between(-1.0, 1.0, rng));

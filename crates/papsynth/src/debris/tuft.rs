@@ -35,7 +35,7 @@ const OUTSIDE: f64 = 2.2;
 
 /// Width of the thinner rim of a tuft, relative to the radius.
 const FADE: f32 = 0.6;
-/// Absorbance at the outline relative to the centre. On extended-focus fields of liquid-based cytology, the edges of
+/// Absorbance at the outline relative to the centre. On EDF fields of liquid-based cytology, the edges of
 /// debris are about as soft as those of leukocytes.
 const EDGE: f32 = 0.1;
 

@@ -1,5 +1,7 @@
 //! Measurements on the image of a nucleus.
 
+use portable_numerics::rounding::round_to_count;
+
 use crate::error::{ErrorKind, NucleusError};
 use crate::model::{Donor, OUTSIDE};
 
@@ -120,7 +122,7 @@ fn profile(absorbance: &[f64], distance: &[f64], mean: f64) -> [f64; PROFILE_STE
     let deepest = inside().fold(1.0_f64, |most, (_, d)| most.max(*d));
     let mut sums = [[0.0; 2]; PROFILE_STEPS];
     for (a, d) in inside() {
-        let step = crate::random::count((d / deepest * PROFILE_STEPS as f64).floor()).min(PROFILE_STEPS - 1);
+        let step = round_to_count((d / deepest * PROFILE_STEPS as f64).floor()).min(PROFILE_STEPS - 1);
         sums[step][0] += a;
         sums[step][1] += 1.0;
     }

@@ -5,6 +5,7 @@ use std::sync::{Arc, OnceLock};
 
 use cloth_verlet::{Cloth, ClothParams};
 use fsd_shape::{Descriptors, ShapeModel};
+use portable_numerics::rounding::round_to_count;
 use quilt_texture::QuiltParams;
 use voronoi_cytoskeleton::{DescentPath, Skeleton, SkeletonParams, Torus};
 
@@ -212,7 +213,7 @@ const TEST_POINTS: usize = 240;
 
 /// Returns the quilting parameters of a recipe for donors with this pixel size.
 fn quilt(nucleus: &PhantomSettings, class: &CellClass, pixel_um: f64) -> QuiltParams {
-    let pixels = |um: f64, least: usize| random::count(um / pixel_um).max(least);
+    let pixels = |um: f64, least: usize| round_to_count(um / pixel_um).max(least);
     // All patches of a quilt have the same size: the midpoints of the recipe's ranges.
     let midpoint = |number: &Number| number.bounds().iter().sum::<f64>() / 2.0;
     let (overlap_px, core_px) = (pixels(midpoint(&nucleus.overlap_um), 1), pixels(midpoint(&nucleus.patch_um), 2));

@@ -15,7 +15,7 @@ pub(super) struct CellContext<'a> {
     pub(super) object: &'a Object,
     pub(super) body: &'a CellBody,
     /// Direction across the streaks of cells at the place of this one, radians.
-    pub(super) streaks: f64,
+    pub(super) across_streaks_rad: f64,
 }
 
 impl CellContext<'_> {

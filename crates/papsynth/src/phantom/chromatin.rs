@@ -4,6 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use fsd_shape::ShapeModel;
 use multiversion::multiversion;
+use portable_numerics::rounding::round_to_count;
 use quilt_texture::{QuiltParams, Quilter, Source};
 use spectral_field::{FieldParams, Padding, SpectralField, Spectrum};
 
@@ -219,7 +220,7 @@ fn depth_from_rim(mask: &[f32], width: usize) -> Vec<f64> {
 /// edge of the last.
 pub(crate) fn interpolate(profile: &[f64], at: f64) -> f64 {
     let position = (at.clamp(0.0, 1.0) * profile.len() as f64 - 0.5).clamp(0.0, (profile.len() - 1) as f64);
-    let cell = random::count(position.floor()).min(profile.len() - 1);
+    let cell = round_to_count(position.floor()).min(profile.len() - 1);
     let next = (cell + 1).min(profile.len() - 1);
     profile[cell] + (position - cell as f64) * (profile[next] - profile[cell])
 }
@@ -287,12 +288,12 @@ impl DonorGrid {
         if (ratio - 1.0).abs() < 1e-9 {
             return Self { mask: coverage.values.clone(), width: coverage.width, ratio: 1.0 };
         }
-        let size = |pixels: usize| random::count((pixels as f64 * ratio).ceil()) + 2;
+        let size = |pixels: usize| round_to_count((pixels as f64 * ratio).ceil()) + 2;
         let (width, height) = (size(coverage.width), size(coverage.height()));
         let mut mask = vec![0.0; width * height];
         // All image pixels that interpolate from here need texture.
         let near = |position: usize, count: usize| {
-            let at = random::count(position as f64 / ratio).min(count - 1);
+            let at = round_to_count(position as f64 / ratio).min(count - 1);
             [at, (at + 1).min(count - 1)]
         };
         let columns: Vec<[usize; 2]> = (0..width).map(|x| near(x, coverage.width)).collect();
@@ -316,7 +317,7 @@ impl DonorGrid {
         }
         let near = |place: usize, count: usize| {
             let at = place as f64 * self.ratio;
-            let first = random::count(at.floor()).min(count - 1);
+            let first = round_to_count(at.floor()).min(count - 1);
             (first, (first + 1).min(count - 1), (at - first as f64) as f32)
         };
         let columns: Vec<(usize, usize, f32)> = (0..coverage.width).map(|x| near(x, self.width)).collect();
@@ -395,7 +396,7 @@ mod tests {
             }
             if ratio != 1.0 {
                 for (i, mask) in grid.mask.iter().enumerate() {
-                    let [x, y] = [i % grid.width, i / grid.width].map(|c| random::count(c as f64 / ratio));
+                    let [x, y] = [i % grid.width, i / grid.width].map(|c| round_to_count(c as f64 / ratio));
                     let near = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
                     let covered = |(x, y): (usize, usize)| coverage.values[y.min(24) * 35 + x.min(34)] > 0.0;
                     assert_eq!(*mask > 0.0, near.into_iter().any(covered), "{ratio} {i}");

@@ -41,8 +41,8 @@ pub(crate) fn make<'a>(
 ) -> Result<Vec<Phantom>, ErrorKind> {
     let cell = |object: &&'a Object| match &object.body {
         Body::Cell(body) => {
-            let streaks = streaks::direction_at(object.centre_um, scene.key_of(object));
-            Some(CellContext { assets, scene, noise_fields, object, body, streaks })
+            let across_streaks_rad = streaks::direction_across(object.centre_um, scene.key_of(object));
+            Some(CellContext { assets, scene, noise_fields, object, body, across_streaks_rad })
         }
         _ => None,
     };

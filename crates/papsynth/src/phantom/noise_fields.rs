@@ -3,6 +3,7 @@
 
 use std::sync::OnceLock;
 
+use portable_numerics::rounding::round_to_count;
 use rand_core::Rng;
 use spectral_field::{FieldParams, Padding, SpectralField, Spectrum};
 
@@ -13,7 +14,7 @@ use crate::random;
 /// Width and height of a noise field in texels: a power of two, so that positions wrap by masking.
 pub(crate) const SIDE: usize = 512;
 
-/// Texel size of the flecks, µm.
+/// Texel size of the field of the spots of cytoplasm (`cytoplasm.flecks` of a recipe), µm.
 const TEXEL_UM: f64 = 0.25;
 
 /// Smoothing of the clouds field, standard deviation in texels.
@@ -22,7 +23,7 @@ const CLOUD_SIGMA: f64 = 6.0;
 /// Plans and spectra of the noise fields, the same for every image.
 #[derive(Debug)]
 pub(crate) struct NoiseFieldGenerator {
-    /// Clouds and flecks.
+    /// Clouds and spots of cytoplasm.
     fields: [SpectralField; 2],
 }
 
@@ -90,7 +91,7 @@ impl NoiseFields<'_> {
         self.noise_field(0, "pool.clouds")
     }
 
-    pub(crate) fn flecks(&self) -> &NoiseField {
+    pub(crate) fn spots(&self) -> &NoiseField {
         self.noise_field(1, "pool.flecks")
     }
 
@@ -116,7 +117,7 @@ impl FieldSampler {
         Self { step: self.step.map(|step| n * step), shear: n * self.shear, ..*self }
     }
 
-    /// Draws a sampler for flecks, with the physical texel size.
+    /// Draws a sampler for the spots of cytoplasm, with the physical texel size.
     pub(crate) fn fine<R: Rng + ?Sized>(pixel_um: f64, rng: &mut R) -> Self {
         Self::new(TEXEL_UM / pixel_um, rng)
     }
@@ -159,7 +160,7 @@ impl NoiseField {
     /// Returns the value below which a fraction of the field lies.
     pub(crate) fn quantile(&self, fraction: f64) -> f32 {
         let last = self.ranked.len().saturating_sub(1);
-        let rank = random::count(fraction * last as f64).min(last);
+        let rank = round_to_count(fraction * last as f64).min(last);
         self.ranked.get(rank).copied().unwrap_or(0.0)
     }
 

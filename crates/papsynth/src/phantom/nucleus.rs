@@ -9,7 +9,7 @@ use super::chromatin::standardise;
 use super::noise_fields::{FieldSampler, SIDE, Texels};
 use super::parametric_shape::{make_irregular, perturbed_circle, placed};
 use super::piece::Piece;
-use super::tile::{Point, Tile, area, scaled_about};
+use super::tile::{Point, Tile, area, radius_of, scaled_about};
 use crate::error::ErrorKind;
 use crate::key::Stream;
 use crate::random;
@@ -185,7 +185,7 @@ fn add_nucleolus(absorbance: &mut Tile, outline: &[Point], centre: Point, cell: 
 
 /// Displaces the points of an outline radially by harmonics of random phase, with notches.
 fn wrinkle(outline: &mut [Point], strength: f64, rng: &mut Stream) {
-    let radius = (area(outline) / core::f64::consts::PI).sqrt();
+    let radius = radius_of(area(outline));
     let waves: Vec<[f64; 3]> = WRINKLES
         .map(|harmonic| {
             let amplitude = strength * radius * random::normal(rng) / (f64::from(harmonic) / 3.0);

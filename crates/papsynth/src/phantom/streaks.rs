@@ -18,7 +18,7 @@ const WAVES: usize = 16;
 /// Returns the direction across the streaks of cells at a place of an image or plot, radians.
 ///
 /// It changes slowly over the slide, so that neighbouring cells have streaks of about the same direction.
-pub(super) fn direction_at(place_um: Point, key: Key) -> f64 {
+pub(super) fn direction_across(place_um: Point, key: Key) -> f64 {
     let mut rng = key.stream("field", 0, "texture.direction");
     let mut sum = [0.0; 2];
     for _ in 0..WAVES {
@@ -54,7 +54,7 @@ mod tests {
             let mean = |turn: f64| {
                 let of_field = |index| {
                     let key = Key { seed: 6, index };
-                    let [a, b] = [0.0, distance * DIRECTION_UM].map(|x| direction_at([120.0 + x, 40.0], key));
+                    let [a, b] = [0.0, distance * DIRECTION_UM].map(|x| direction_across([120.0 + x, 40.0], key));
                     libm::cos(2.0 * (b - turn * a))
                 };
                 (0..FIELDS).map(of_field).sum::<f64>() / FIELDS as f64

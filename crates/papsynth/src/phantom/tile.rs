@@ -238,6 +238,11 @@ pub(crate) fn area(polygon: &[Point]) -> f64 {
     fsd_shape::signed_area(polygon).abs()
 }
 
+/// Returns the radius of a circle with this area.
+pub(crate) fn radius_of(area: f64) -> f64 {
+    (area / core::f64::consts::PI).sqrt()
+}
+
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use portable_numerics::rounding::round_to_count;
 use rand_core::Rng;
 use serde::de::{self, Deserializer, MapAccess, Visitor};
 use serde::ser::{SerializeMap, Serializer};
@@ -151,7 +152,7 @@ impl Number {
 
     /// Draws a value and rounds it to a count.
     pub fn draw_count<R: Rng + ?Sized>(&self, rng: &mut R) -> usize {
-        random::count(self.draw(rng))
+        round_to_count(self.draw(rng))
     }
 
     /// Returns the mean of the drawn values.
@@ -162,7 +163,7 @@ impl Number {
 
     /// Returns the mean of the drawn values, rounded to counts.
     pub(crate) fn mean_count(&self) -> f64 {
-        self.mean_of(|value| random::count(value) as f64)
+        self.mean_of(|value| round_to_count(value) as f64)
     }
 
     /// Returns the mean of a function of the drawn values.

@@ -7,7 +7,7 @@ use super::section::{Bounds, Part};
 use super::whole::Recipe;
 
 /// Spread of numbers between real slides: paths, where `*` stands for any name, and standard deviations of the
-/// logarithm. Measured with `papsynth match` on 24 extended-focus fields of liquid-based cytology, the blur before the
+/// logarithm. Measured with `papsynth match` on 24 EDF fields of liquid-based cytology, the blur before the
 /// fields of a match shared one.
 const SPREADS: [(&str, f64); 17] = [
     ("stain.field_cytoplasm", 0.25),

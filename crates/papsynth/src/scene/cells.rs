@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use portable_numerics::rounding::round_to_count;
 use rand_core::Rng;
 
 use crate::error::ErrorKind;
@@ -103,7 +104,7 @@ fn fitting(recipe: &Recipe, places: &Places, requested: &[usize], crowding: Crow
         // Only the first cell of a group keeps its distance.
         counts[usize::from(mix.count.is_density())] += match mix.group.form {
             GroupForm::Single => *count,
-            _ => random::count((*count as f64 / mix.group.size.mean_count().max(1.0)).ceil()),
+            _ => round_to_count((*count as f64 / mix.group.size.mean_count().max(1.0)).ceil()),
         };
     }
     let [in_field, in_both] = counts;
@@ -115,7 +116,7 @@ fn fitting(recipe: &Recipe, places: &Places, requested: &[usize], crowding: Crow
     }
     match places.check(in_field, in_both) {
         Err(fraction) if crowding == Crowding::LeaveOut => {
-            let fewer = |count: &usize| random::count((*count as f64 * CROWDED * fraction).ceil());
+            let fewer = |count: &usize| round_to_count((*count as f64 * CROWDED * fraction).ceil());
             Ok(requested.iter().map(fewer).collect())
         }
         Err(_) => Err(places.no_room(in_field, in_both)),
@@ -263,7 +264,7 @@ fn draw_body(
         pyknotic,
         wrinkle: if wrinkled { random::between(0.3, 1.0, rng) } else { 0.0 },
         // The mean number, one more or less.
-        nucleoli: random::count(
+        nucleoli: round_to_count(
             nucleus.nucleoli + random::between(-1.0, 1.0, &mut own("nucleoli")) * nucleus.nucleoli.min(1.0),
         ),
     };
@@ -334,9 +335,9 @@ fn draw_detail(recipe: &Recipe, pliability: f64, rng: &mut Stream, own: &impl Fn
         angularity: pliable(named!(recipe.cytoplasm.angularity)),
         elongation: own(named!(recipe.cytoplasm.elongation)),
         degeneration: own(named!(recipe.cytoplasm.degeneration)),
-        notches: random::count(pliable(named!(recipe.cytoplasm.notches))),
-        protrusions: random::count(pliable(named!(recipe.cytoplasm.protrusions))),
-        wrinkles: random::count(pliable(named!(recipe.cytoplasm.wrinkles))),
+        notches: round_to_count(pliable(named!(recipe.cytoplasm.notches))),
+        protrusions: round_to_count(pliable(named!(recipe.cytoplasm.protrusions))),
+        wrinkles: round_to_count(pliable(named!(recipe.cytoplasm.wrinkles))),
         wrinkle_thickness: own(named!(recipe.cytoplasm.wrinkle_thickness)),
         ridges: own(named!(recipe.cytoplasm.ridges)),
         wrinkle_um: own(named!(recipe.cytoplasm.wrinkle_um)),

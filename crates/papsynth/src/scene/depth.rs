@@ -1,6 +1,7 @@
 //! The variation of depth over a field: "a median filtered Perlin noise image, scaled to encompass the desired depth".
 
 use perlin_bg::{Fractal, FractalParams};
+use portable_numerics::rounding::round_to_count;
 
 /// Depth of the places of a field.
 #[derive(Debug, Clone)]
@@ -18,7 +19,7 @@ impl Relief {
         /// Samples per cell of the noise, for linear interpolation.
         const SAMPLES: f64 = 8.0;
         let pitch_um = relief_um / SAMPLES;
-        let samples = |length: f64| crate::random::count((length / pitch_um).ceil()) + 2;
+        let samples = |length: f64| round_to_count((length / pitch_um).ceil()) + 2;
         let (width, height) = (samples(size_um[0]), samples(size_um[1]));
         let params = FractalParams { octaves: 2, ..FractalParams::default() };
         let noise = Fractal::new(&params, key).expect("two octaves of noise are valid");
@@ -28,7 +29,7 @@ impl Relief {
                 raw.push(f64::from(noise.at(x as f64 / SAMPLES, y as f64 / SAMPLES)));
             }
         }
-        let mut depths = median(&raw, width, crate::random::count(median_um / pitch_um / 2.0));
+        let mut depths = median(&raw, width, round_to_count(median_um / pitch_um / 2.0));
         // Scaled to the range of depth, about the centre of the slide.
         let (low, high) = depths.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
         let scale = if high > low { depth_um / (high - low) } else { 0.0 };
@@ -42,7 +43,7 @@ impl Relief {
     pub(crate) fn at(&self, place_um: [f64; 2]) -> f64 {
         let grid = |value: f64, count: usize| {
             let position = (value / self.pitch_um).clamp(0.0, (count - 1) as f64);
-            let cell = crate::random::count(position.floor()).min(count - 2);
+            let cell = round_to_count(position.floor()).min(count - 2);
             (cell, position - cell as f64)
         };
         let ((x, fx), (y, fy)) = (grid(place_um[0], self.width), grid(place_um[1], self.height));

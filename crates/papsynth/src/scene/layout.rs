@@ -1,5 +1,6 @@
 //! Draws the weight map of a layout, and places cells with a minimum distance.
 
+use portable_numerics::rounding::round_to_count;
 use rand_core::Rng;
 
 use crate::error::ErrorKind;
@@ -49,9 +50,9 @@ pub(super) fn weights(
     numbers: &FieldNumbers,
 ) -> Result<Weights, ErrorKind> {
     let field = Region::of(view);
-    let pixels = field.size_um.map(|length| random::count((length / PITCH_UM).ceil()).clamp(1, MOST_PIXELS));
+    let pixels = field.size_um.map(|length| round_to_count((length / PITCH_UM).ceil()).clamp(1, MOST_PIXELS));
     let pitch_um = [0, 1].map(|axis| field.size_um[axis] / pixels[axis] as f64);
-    let margin_px = pitch_um.map(|pitch| random::count((MARGIN_UM / pitch).ceil()));
+    let margin_px = pitch_um.map(|pitch| round_to_count((MARGIN_UM / pitch).ceil()));
     let region = field.with_margin([0, 1].map(|axis| margin_px[axis] as f64 * pitch_um[axis]));
     let size = [0, 1].map(|axis| pixels[axis] + 2 * margin_px[axis]);
     // A given map has no margin.
@@ -160,7 +161,7 @@ fn nearest_of(clusters: &[[f64; 3]], [width, height]: [usize; 2], size_um: [f64;
         // The pixels in reach, and the distance of a pixel from the cluster.
         let along = |middle: f64, pixels: usize, length: f64| {
             let pitch = length / pixels as f64;
-            let pixel = |at: f64| random::count((at / pitch).clamp(0.0, pixels as f64));
+            let pixel = |at: f64| round_to_count((at / pitch).clamp(0.0, pixels as f64));
             let within = pixel(middle - REACH * radius)..pixel(middle + REACH * radius);
             let place = move |pixel: usize| ((pixel as f64 + 0.5) / pixels as f64 * length - middle) / radius;
             (within, place)
@@ -245,7 +246,7 @@ impl Places {
     /// Returns the error about cells that do not fit.
     pub(super) fn no_room(&self, in_field: usize, in_both: usize) -> ErrorKind {
         ErrorKind::NoRoom {
-            count: random::count(self.count_in_field(in_field, in_both)),
+            count: round_to_count(self.count_in_field(in_field, in_both)),
             spacing_um: self.spacing_um,
             area_um2: self.area_um2(false),
             room: self.room(false),

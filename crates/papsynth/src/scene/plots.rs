@@ -9,6 +9,7 @@ use std::convert::Infallible;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use perlin_bg::{Fractal, FractalParams};
+use portable_numerics::rounding::round_to_count;
 use rand_core::Rng;
 
 use super::cells::{Class, Drawn};
@@ -163,7 +164,7 @@ impl Population {
             _ => return Err(ErrorKind::LayoutOfField),
         };
         let largest = layout.radius_um.bounds()[1];
-        let reach = random::count((CLUSTER_REACH * largest / self.side_um()).ceil()) as i64;
+        let reach = round_to_count((CLUSTER_REACH * largest / self.side_um()).ceil()) as i64;
         if reach > FARTHEST {
             return Err(ErrorKind::WideClusters(largest, FARTHEST as f64 * self.side_um() / CLUSTER_REACH));
         }

@@ -11,6 +11,7 @@ use optics_psf::{
     Source, fast_length,
 };
 use portable_numerics::elementary::exp10_from;
+use portable_numerics::rounding::round_to_count;
 
 use super::broad_band::BroadBand;
 use super::channel_lights::{ChannelLight, LightGroup, MicroscopeCache, light_groups};
@@ -423,7 +424,7 @@ fn abbe_image(
 ) -> Result<Factor, ErrorKind> {
     let View { width, height, pixel_um } = specimen.scene.grid();
     // The grid is periodic: with this margin, light that wraps around does not reach the image.
-    let margin = crate::random::count(((reach_um(specimen, microscope, stage_um) + DIFFRACTION_UM) / pixel_um).ceil());
+    let margin = round_to_count(((reach_um(specimen, microscope, stage_um) + DIFFRACTION_UM) / pixel_um).ceil());
     let size = [width, height].map(|side| fast_length(side + 2 * margin));
     let frame = Window { origin: [-(margin as i64); 2], width: size[0], height: size[1] };
     let params =

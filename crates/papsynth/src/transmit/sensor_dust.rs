@@ -1,5 +1,7 @@
 //! Dust on the sensor: specks at the same pixels of every image of a camera.
 
+use portable_numerics::rounding::round_to_count;
+
 use crate::key::Key;
 use crate::random;
 use crate::scene::SceneCamera;
@@ -21,7 +23,7 @@ const REACH_PX: f64 = 7.0;
 /// Adds the specks to the logarithm of the light of an image whose rows have `width` pixels.
 pub(super) fn add(light_log10: &mut [f32], width: usize, camera: &SceneCamera) {
     let height = light_log10.len() / width.max(1);
-    let count = random::count(camera.sensor_dust * light_log10.len() as f64 * 1e-6);
+    let count = round_to_count(camera.sensor_dust * light_log10.len() as f64 * 1e-6);
     let key = Key { seed: camera.serial, index: 0 };
     for number in 0..count as u64 {
         let rng = &mut key.stream("camera", number, "dust");
@@ -30,8 +32,9 @@ pub(super) fn add(light_log10: &mut [f32], width: usize, camera: &SceneCamera) {
         let line = random::between(WIDTH_PX[0], WIDTH_PX[1], rng);
         let loss = (LOSS[0] * libm::exp(LOSS[1] * random::normal(rng))).min(LOSS[2]);
         let gauss = |distance: f64, sd: f64| libm::exp(-0.5 * (distance / sd) * (distance / sd));
-        let [columns, rows] = [(centre[0], width), (centre[1], height)]
-            .map(|(at, size)| random::count((at - REACH_PX).max(0.0))..random::count((at + REACH_PX).min(size as f64)));
+        let [columns, rows] = [(centre[0], width), (centre[1], height)].map(|(at, size)| {
+            round_to_count((at - REACH_PX).max(0.0))..round_to_count((at + REACH_PX).min(size as f64))
+        });
         for y in rows {
             for x in columns.clone() {
                 let [dx, dy] = [x as f64 + 0.5 - centre[0], y as f64 + 0.5 - centre[1]];

@@ -2,9 +2,9 @@
 
 use multiversion::multiversion;
 use optics_psf::{Border, Gaussian, Scratch};
+use portable_numerics::rounding::round_to_count;
 
 use crate::error::ErrorKind;
-use crate::random;
 
 /// Standard deviations of the parts of the kernel, relative to the distance of the recipe, and their weights.
 ///
@@ -37,7 +37,7 @@ pub(super) struct Absorbed {
 impl Spread {
     /// Returns the kernel for a distance in pixels.
     pub(super) fn new(distance_px: f64) -> Result<Self, ErrorKind> {
-        let side = 2 * random::count(0.5 * distance_px / COARSE_SD).max(1);
+        let side = 2 * round_to_count(0.5 * distance_px / COARSE_SD).max(1);
         let part = |(relative, weight): (f64, f32)| {
             let gaussian = Gaussian::new(relative * distance_px / side as f64);
             gaussian

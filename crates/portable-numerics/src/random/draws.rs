@@ -45,14 +45,6 @@ pub fn direction<R: Rng + ?Sized>(rng: &mut R) -> f64 {
     between(0.0, core::f64::consts::TAU, rng)
 }
 
-/// Rounds a number to an integer, clamped to 0 to 2³² − 1. NaN gives 0.
-#[must_use]
-pub fn count(value: f64) -> usize {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the range of u32")]
-    let count = libm::round(value).clamp(0.0, f64::from(u32::MAX)) as usize;
-    count
-}
-
 /// Shuffles items; every permutation is equally likely (Fisher and Yates).
 pub fn shuffle<T, R: Rng + ?Sized>(items: &mut [T], rng: &mut R) {
     for last in (1..items.len()).rev() {
@@ -187,12 +179,6 @@ mod tests {
         }
         // Six permutations, 1000 times each, with a standard error of √(6000 · 1/6 · 5/6) = 29.
         assert!(counts.len() == 6 && counts.values().all(|c: &i32| (c - 1000).abs() < 4 * 29), "{counts:?}");
-    }
-
-    #[test]
-    fn counts_are_rounded_and_bounded() {
-        let counts = [-3.0, f64::NAN, 0.49, 0.5, 2.5, 1e300].map(count);
-        assert_eq!(counts, [0, 0, 0, 1, 3, u32::MAX as usize]);
     }
 
     #[test]

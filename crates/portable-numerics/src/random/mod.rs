@@ -13,8 +13,8 @@ mod splitmix;
 mod ziggurat;
 
 pub use draws::{
-    Normals, below, between, chance, count, direction, normal, normals_of_words, open_uniform, open_unit, shuffle,
-    uniform, unit,
+    Normals, below, between, chance, direction, normal, normals_of_words, open_uniform, open_unit, shuffle, uniform,
+    unit,
 };
 pub use rand_core::Rng;
 pub use splitmix::SplitMix64;

@@ -95,8 +95,8 @@ const BORDER: [f64; 2] = [0.0, 0.7];
 const FLATNESS: [f64; 2] = [0.0, 0.6];
 
 /// Softness, µm: standard deviation of the blur of a leukocyte, minimum and maximum. Many leukocytes are about as high
-/// as wide, so that most of such a leukocyte is out of focus in every plane, and also in fused images. The range was
-/// chosen by eye beside fused and unfused images.
+/// as wide, so that most of such a leukocyte is out of focus in every plane, and also in EDF images. The range was
+/// chosen by eye beside EDF images and single planes.
 const SOFTNESS_UM: [f64; 2] = [0.05, 0.4];
 /// Reach of this blur, in standard deviations.
 const SOFT_REACH: f64 = 3.0;

@@ -1,11 +1,11 @@
 //! Slowly changing images, drawn with coarse pixels.
 
 use multiversion::multiversion;
+use portable_numerics::rounding::round_to_count;
 
 use crate::phantom::box_sums::averaged;
 use crate::phantom::noise_fields::{FieldSampler, NoiseField, SIDE};
 use crate::phantom::tile::{Point, Tile};
-use crate::random;
 
 /// Smallest standard deviation of the smoothing of clouds that are interpolated from coarse pixels, px: three coarse
 /// pixels. The root mean square error is then a hundredth of the standard deviation of the clouds.
@@ -31,8 +31,8 @@ impl CoarseTile {
         Self { coarse, line: vec![0.0; width] }
     }
 
-    /// Draws the inside of a polygon, smoothed with about a Gaussian of this standard deviation, px: the mean over
-    /// squares, three times.
+    /// Rasterizes a polygon (1 inside, 0 outside) and blurs it with three box filters, which approximate a Gaussian of
+    /// standard deviation `sigma_px`.
     pub(super) fn smoothed(like: &Tile, polygon: &[Point], sigma_px: f64) -> Self {
         let place = |p: &Point| [0, 1].map(|axis| (p[axis] - like.origin[axis] as f64 - FIRST) / COARSE as f64);
         let polygon: Vec<Point> = polygon.iter().map(place).collect();
@@ -42,7 +42,7 @@ impl CoarseTile {
         // The variance of a square of side s is (s² − 1)/12.
         let radius = 0.5 * ((4.0 * sigma * sigma + 1.0).sqrt() - 1.0);
         for more in [0.0, 1.0 / 3.0, -1.0 / 3.0] {
-            drawn.coarse = averaged(&drawn.coarse, random::count((radius + more).max(0.0)));
+            drawn.coarse = averaged(&drawn.coarse, round_to_count((radius + more).max(0.0)));
         }
         drawn
     }
@@ -99,6 +99,7 @@ mod tests {
     use super::*;
     use crate::key::Key;
     use crate::phantom::noise_fields::NoiseFieldGenerator;
+    use crate::random;
 
     #[test]
     fn a_smoothed_half_plane_is_the_normal_distribution_function() {

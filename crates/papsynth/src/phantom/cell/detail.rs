@@ -1,4 +1,4 @@
-//! Detail of cytoplasm: clouds, flecks, fine texture, cytoskeleton.
+//! Detail of cytoplasm: clouds, spots (the field `cytoplasm.flecks` of a recipe), fine texture, cytoskeleton.
 
 use core::ops::Range;
 
@@ -15,39 +15,40 @@ use crate::phantom::noise_fields::{FieldSampler, NoiseField, SIDE, Texels};
 use crate::phantom::tile::{Point, Tile};
 use crate::random;
 
-/// Multiplies the thickness by clouds, flecks and the fine texture. `inner` is 1 in the endoplasm and 0 outside.
-pub(super) fn add_detail(
-    absorbance: &mut Tile,
+/// Multiplies the thickness by clouds, spots and the fine texture. `inner` is 1 in the endoplasm and 0 outside.
+pub(super) fn add_clouds_and_texture(
+    thickness: &mut Tile,
     coverage: &Tile,
     inner: Option<CoarseTile>,
     cell: &CellContext<'_>,
     rng: &mut Stream,
 ) -> Result<(), ErrorKind> {
     let (detail, noise_fields, pixel_um) = (&cell.body.detail, cell.noise_fields, cell.pixel_um());
-    let mut clouds = Clouds::new(absorbance, cell, rng);
-    let flecks = FieldSampler::fine(pixel_um, rng);
-    let mut texture = FineTexture::new(absorbance, cell, inner)?;
-    let (cloud, fleck) = (detail.clouds as f32, detail.flecks as f32);
-    let threshold = if fleck > 0.0 { noise_fields.flecks().quantile(detail.flecks_threshold) } else { 0.0 };
-    let width = absorbance.width;
+    let mut clouds = Clouds::new(thickness, cell, rng);
+    let spots = FieldSampler::fine(pixel_um, rng);
+    let mut texture = FineTexture::new(thickness, cell, inner)?;
+    let strengths = [detail.clouds, detail.flecks].map(|strength| strength as f32);
+    let has_spots = strengths[1] > 0.0;
+    let threshold = if has_spots { noise_fields.spots().quantile(detail.flecks_threshold) } else { 0.0 };
+    let width = thickness.width;
     let mut fields = [(); 3].map(|()| vec![0.0_f32; width]);
     let mut texels: Texels = [0.0; SIDE + 1];
-    let rows = absorbance.values.chunks_exact_mut(width).zip(coverage.values.chunks_exact(width));
+    let rows = thickness.values.chunks_exact_mut(width).zip(coverage.values.chunks_exact(width));
     for (y, (row, cover)) in rows.enumerate() {
         let Some((first, end)) = covered(cover) else { continue };
         let at = [first as f64, y as f64];
-        let [of_clouds, of_flecks, of_texture] = &mut fields;
+        let [of_clouds, of_spots, of_texture] = &mut fields;
         if let Some(clouds) = &mut clouds {
             clouds.row_into(of_clouds, first..end, y, &mut texels);
         }
-        if fleck > 0.0 {
-            noise_fields.flecks().row_into(&mut of_flecks[first..end], &flecks, at, &mut texels);
+        if has_spots {
+            noise_fields.spots().row_into(&mut of_spots[first..end], &spots, at, &mut texels);
         }
         if let Some(texture) = &mut texture {
             texture.row_into(of_texture, first..end, y);
         }
-        let fields = [&*of_clouds, of_flecks, of_texture].map(|field| &field[first..end]);
-        modulate(&mut row[first..end], fields, [cloud, fleck], threshold);
+        let fields = [&*of_clouds, of_spots, of_texture].map(|field| &field[first..end]);
+        modulate(&mut row[first..end], fields, strengths, threshold);
     }
     Ok(())
 }
@@ -88,7 +89,7 @@ impl<'a> Clouds<'a> {
         let detail = &cell.body.detail;
         let sizes = CLOUDS_SIZES.map(|size| size * detail.clouds_um / cell.pixel_um());
         let samplers = sizes.map(|sigma_px| {
-            let along = cell.streaks + CLOUDS_DEVIATION * random::normal(rng) + core::f64::consts::FRAC_PI_2;
+            let along = cell.across_streaks_rad + CLOUDS_DEVIATION * random::normal(rng) + core::f64::consts::FRAC_PI_2;
             FieldSampler::clouds(sigma_px, rng).stretched(detail.clouds_stretch, along)
         });
         if detail.clouds <= 0.0 {
@@ -130,7 +131,7 @@ const CLOUD_LIMITS: [f32; 2] = [-1.4, 1.7];
 /// Mean of limited clouds with their square.
 const CLOUD_MEAN: f32 = 0.2957;
 
-/// Multiplies a row by 1 plus the clouds and the flecks above a threshold, times their strengths, and by 1 plus the
+/// Multiplies a row by 1 plus the clouds and the spots above a threshold, times their strengths, and by 1 plus the
 /// texture. Clouds are limited, and skewed by their square; their standard deviation becomes 0.98. Negative factors
 /// count as 0.
 ///
@@ -138,9 +139,9 @@ const CLOUD_MEAN: f32 = 0.2957;
 /// [`THIN`]. Within single cells of Cervix93, the amplitude of details of 1 to 3 px is proportional to the power 0.6 to
 /// 0.9 of the absorbance around them: dark places are granular, too.
 #[multiversion(targets = "simd")]
-fn modulate(row: &mut [f32], [clouds, flecks, texture]: [&[f32]; 3], strengths: [f32; 2], threshold: f32) {
-    for (((value, cloud), &fleck), texture) in row.iter_mut().zip(clouds).zip(flecks).zip(texture) {
-        let above = if fleck > threshold { fleck - threshold } else { 0.0 };
+fn modulate(row: &mut [f32], [clouds, spots, texture]: [&[f32]; 3], strengths: [f32; 2], threshold: f32) {
+    for (((value, cloud), &spot), texture) in row.iter_mut().zip(clouds).zip(spots).zip(texture) {
+        let above = if spot > threshold { spot - threshold } else { 0.0 };
         let thickness = if *value > 0.0 { *value } else { 0.0 };
         let thinness = TEXTURE_THICKNESS / if thickness > THIN { thickness } else { THIN };
         let deviation = texture * thinness.sqrt().sqrt();
@@ -160,7 +161,7 @@ pub(super) fn covered(row: &[f32]) -> Option<(usize, usize)> {
 
 /// Adds the fibres of the cytoskeleton. `lines` is an image of zeros, of the same size.
 pub(super) fn add_cytoskeleton(
-    absorbance: &mut Tile,
+    thickness: &mut Tile,
     outline: &[Point],
     cell: &CellContext<'_>,
     lines: &mut [f32],
@@ -172,23 +173,23 @@ pub(super) fn add_cytoskeleton(
     if strength <= 0.0 {
         return Ok(());
     }
-    let origin = absorbance.origin.map(|o| o as f64);
+    let origin = thickness.origin.map(|o| o as f64);
     let local: Vec<Point> = outline.iter().map(|p| [p[0] - origin[0], p[1] - origin[1]]).collect();
     let fibres = cell.assets.cytoskeletons.grow(&local, rng)?;
     let line = LineParams { width_px: (FIBRE_UM / cell.pixel_um()).max(1.0), ..LineParams::default() };
-    draw_into(lines, absorbance.width, &fibres, &line)?;
-    add_row(&mut absorbance.values, lines, strength as f32);
+    draw_into(lines, thickness.width, &fibres, &line)?;
+    add_row(&mut thickness.values, lines, strength as f32);
     Ok(())
 }
 
 /// Applies a linear thickness gradient: relative change per cell radius, in x and y.
-pub(super) fn apply_gradient(absorbance: &mut Tile, centre: Point, radius_px: f64, gradient: [f64; 2]) {
+pub(super) fn apply_gradient(thickness: &mut Tile, centre: Point, radius_px: f64, gradient: [f64; 2]) {
     if gradient == [0.0; 2] {
         return;
     }
     let [across, down] = gradient.map(|slope| slope / radius_px);
-    let [left, top] = [0, 1].map(|axis| absorbance.origin[axis] as f64 - centre[axis]);
-    for (y, row) in absorbance.values.chunks_exact_mut(absorbance.width).enumerate() {
+    let [left, top] = [0, 1].map(|axis| thickness.origin[axis] as f64 - centre[axis]);
+    for (y, row) in thickness.values.chunks_exact_mut(thickness.width).enumerate() {
         scale_row(row, (1.0 + across * left + down * (top + y as f64)) as f32, across as f32);
     }
 }

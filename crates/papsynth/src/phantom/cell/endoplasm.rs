@@ -33,7 +33,7 @@ pub(super) fn ramp(like: &Tile, polygon: &[Point], centre: Point, inner: f64, ou
 /// Adds the endoplasm: the inner part of the cytoplasm, denser than the outer part. Returns its zone: 1 inside, 0
 /// outside.
 pub(super) fn add_endoplasm(
-    absorbance: &mut Tile,
+    thickness: &mut Tile,
     outline: &[Point],
     nucleus: Point,
     cell: &CellContext<'_>,
@@ -50,7 +50,7 @@ pub(super) fn add_endoplasm(
     let mut zone: Vec<Point> = around.collect();
     make_irregular(&mut zone, INNER_IRREGULARITY, rng);
     let zone: Vec<Point> = zone.iter().map(|p| [p[0] + nucleus[0], p[1] + nucleus[1]]).collect();
-    let mut inner = CoarseTile::smoothed(absorbance, &zone, sigma_px);
+    let mut inner = CoarseTile::smoothed(thickness, &zone, sigma_px);
     // Densest where the nucleus lifts the sheet.
     let radius = body.nucleus.radius_um / pixel_um;
     let round = perturbed_circle(radius, 0.15, 0.15, rng);
@@ -58,12 +58,12 @@ pub(super) fn add_endoplasm(
     let near = Tile::around(&scaled_about(&round, nucleus, LIFTED), 1.0);
     let lifted = ramp(&near, &round, nucleus, 1.0, LIFTED);
     let lift = LIFT * body.detail.endoplasm as f32;
-    absorbance.blend(&lifted, |values, ramp| {
+    thickness.blend(&lifted, |values, ramp| {
         values.iter_mut().zip(ramp).for_each(|(value, ramp)| *value *= 1.0 + lift * ramp);
     });
     let density = body.detail.endoplasm as f32;
-    let mut inside = vec![0.0_f32; absorbance.width];
-    for (y, row) in absorbance.values.chunks_exact_mut(inside.len()).enumerate() {
+    let mut inside = vec![0.0_f32; thickness.width];
+    for (y, row) in thickness.values.chunks_exact_mut(inside.len()).enumerate() {
         inner.row_into(&mut inside, y);
         thicken(row, &inside, INNER * density);
     }

@@ -39,7 +39,7 @@ impl<'a> FineTexture<'a> {
         let relative_um = pixel_um / cell.body.detail.texture_size;
         let centre = [like.width, like.height()].map(|side| 0.5 * side as f64);
         let mut kind = |name| {
-            let across = cell.streaks + DEVIATION * random::normal(&mut rng);
+            let across = cell.across_streaks_rad + DEVIATION * random::normal(&mut rng);
             let bend = BEND * pixel_um * random::normal(&mut rng).clamp(-MOST_BENT, MOST_BENT);
             let streaks = Streaks { across, bend, centre };
             pools.pool(name).map(|pool| (pool, pools.sampler(relative_um, streaks, &mut rng)))

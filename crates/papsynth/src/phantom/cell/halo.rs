@@ -9,10 +9,10 @@ use crate::random;
 use crate::scene::cell::{Halo, stretched};
 
 /// Applies the halo of a koilocyte: the cleared space around the nucleus and the condensed cytoplasm at its edge.
-pub(super) fn add_halo(absorbance: &mut Tile, nucleus: Point, cell: &CellContext<'_>) {
+pub(super) fn add_halo(thickness: &mut Tile, nucleus: Point, cell: &CellContext<'_>) {
     let Some(halo) = &cell.body.halo else { return };
     let factors = factors(halo, halo.radius_um / cell.pixel_um(), nucleus, &mut cell.stream("halo"));
-    absorbance.blend(&factors, |values, factors| {
+    thickness.blend(&factors, |values, factors| {
         values.iter_mut().zip(factors).for_each(|(value, factor)| *value *= factor);
     });
 }

@@ -3,6 +3,7 @@
 
 use cloth_verlet::{Crease, FoldKind, PixelGrid, Sheet, SheetSpec, Wave, crease_outline};
 
+mod autoregression;
 mod coarse_tile;
 mod degeneration;
 mod detail;
@@ -24,7 +25,7 @@ use crate::phantom::cell_context::CellContext;
 use crate::phantom::chromatin::interpolate;
 use crate::phantom::nucleus;
 use crate::phantom::piece::{MIN_ABSORBANCE, Phantom, Piece};
-use crate::phantom::tile::{Point, Tile, area};
+use crate::phantom::tile::{Point, Tile, area, radius_of};
 use crate::profile::Stage;
 use crate::random;
 use crate::scene::cell::{CellBody, Fold, FoldForm, NucleusBody, stretched};
@@ -36,6 +37,13 @@ const POINTS: usize = 180;
 
 /// Largest angle between the two creases of a cell folded from both sides, radians.
 const SKEW: f64 = 0.45;
+
+/// Periods of this angle over a full turn of the direction of the first crease. The direction is random, so the angle
+/// needs no random number of its own.
+const SKEW_PERIODS: f64 = 7.0;
+
+/// Smallest distance of a crease, with its waves, from the centre of the nucleus, in radii of the nucleus.
+const NUCLEUS_CLEARANCE: f64 = 1.3;
 
 /// Waves of a crease: amplitude relative to that of the recipe; shortest and longest wavelength in radii of the cell.
 const WAVES: [[f64; 3]; 2] = [[1.0, 0.8, 1.8], [0.3, 0.3, 0.6]];
@@ -93,7 +101,7 @@ fn outline(cell: &CellContext<'_>, class: &ClassAssets, centre: Point) -> Result
 
 /// Returns the creases along which a cell is folded.
 fn creases(cell: &CellContext<'_>, fold: Fold, outline: &[Point], centre: Point) -> Vec<Crease> {
-    let radius = (area(outline) / core::f64::consts::PI).sqrt();
+    let radius = radius_of(area(outline));
     let (body, pixel_um) = (cell.body, cell.pixel_um());
     let off_centre = body.nucleus.off_centre.map(|fraction| fraction * body.radius_um / pixel_um);
     let nucleus_radius = body.nucleus.radius_um / pixel_um;
@@ -105,7 +113,7 @@ fn creases(cell: &CellContext<'_>, fold: Fold, outline: &[Point], centre: Point)
         // The nucleus is too stiff to fold, so the crease with its waves keeps a distance from it.
         let nucleus_at = off_centre[0] * normal[0] + off_centre[1] * normal[1];
         let waves = fold.waviness * radius * WAVES.iter().map(|wave| wave[0]).sum::<f64>();
-        let at = (reach - fold.depth * radius).max(nucleus_at + 1.3 * nucleus_radius + waves);
+        let at = (reach - fold.depth * radius).max(nucleus_at + NUCLEUS_CLEARANCE * nucleus_radius + waves);
         let kind = match fold.form {
             FoldForm::Flap | FoldForm::FoldedOver => FoldKind::Flap,
             FoldForm::Roll => FoldKind::Roll { turns: 1 },
@@ -132,7 +140,8 @@ fn creases(cell: &CellContext<'_>, fold: Fold, outline: &[Point], centre: Point)
     match fold.form {
         // The two creases are not exactly parallel.
         FoldForm::FoldedOver => {
-            vec![crease(direction), crease(direction + core::f64::consts::PI + SKEW * libm::sin(7.0 * direction))]
+            let skew = SKEW * libm::sin(SKEW_PERIODS * direction);
+            vec![crease(direction), crease(direction + core::f64::consts::PI + skew)]
         }
         FoldForm::Flap | FoldForm::Roll => vec![crease(direction)],
     }
@@ -179,77 +188,14 @@ fn crumple(
 fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Result<Phantom, ErrorKind> {
     let CellContext { scene, body, .. } = *cell;
     let mut rng = cell.stream("detail");
-    let pixel_um = cell.pixel_um();
-    let mut pieces = vec![plan.outline.clone()];
-    for crease in &plan.creases {
-        let folded = pieces.iter().map(|piece| crease_outline(piece, crease)).collect::<Result<Vec<_>, _>>();
-        pieces = folded?.concat();
-    }
-    let edges: Vec<Vec<Point>> = plan.creases.iter().filter_map(|crease| edge_of_flap(&pieces, crease)).collect();
+    let outlines = folded_outlines(&plan)?;
+    let edges: Vec<Vec<Point>> = plan.creases.iter().filter_map(|crease| edge_of_flap(&outlines, crease)).collect();
     let wrinkles = Wrinkles::new(&plan.outline, &edges, cell);
-    let rough: Vec<Vec<Point>> = pieces
-        .iter()
-        .map(|p| {
-            let roughness = |p: Point| {
-                let on_crease = plan.creases.iter().any(|crease| crease.distance_beyond(p) > 0.0);
-                if on_crease { 0.0 } else { wrinkles.roughness(p, pixel_um) }
-            };
-            outline::roughened(
-                p,
-                outline::fray_um(&body.detail) / pixel_um,
-                RIM_STEP_UM / pixel_um,
-                roughness,
-                &mut rng,
-            )
-        })
-        .collect();
-    let mut coverage = Tile::around(rough.iter().flatten(), 3.0);
-    for piece in &rough {
-        coverage.cover(piece);
-    }
-
-    let profile = &plan.class.class.cytoplasm.rim_to_centre;
-    let rim = body.detail.rim_um / body.radius_um;
-    let thinned = |depth: f64, thinning: fn(f64) -> f64| {
-        interpolate(profile, depth) * if rim > 0.0 { thinning(depth / rim) } else { 1.0 }
-    };
-    let mut absorbance = coverage.blank();
-    // A folded cell is thin at the rim of the sheet, part of which lies on the cell. Its edge, with the creases, is
-    // soft in a narrower zone.
-    let folded = sheet.is_some() && !plan.creases.is_empty();
-    match sheet {
-        Some(mut sheet) => {
-            for crease in &plan.creases {
-                sheet.fold(crease)?;
-            }
-            let view =
-                PixelGrid { origin: [absorbance.origin[0] as f64, absorbance.origin[1] as f64], pixel_size: 1.0 };
-            let thinning = if folded { rim::thinning } else { rim::beyond_zone };
-            sheet.thickness_into(&mut absorbance.values, coverage.width, &view, |radius| {
-                thinned(1.0 - radius, thinning)
-            });
-            ridges::limit_ridges(&mut absorbance, body.detail.ridges, pixel_um);
-        }
-        None => flat(&mut absorbance, &coverage, plan.centre, body.radius_um / pixel_um, |depth| {
-            thinned(depth, rim::beyond_zone)
-        }),
-    }
-    detail::apply_gradient(&mut absorbance, plan.centre, body.radius_um / pixel_um, body.detail.thickness_gradient);
-    let rim_um = if folded { body.detail.rim_um.min(FOLD_EDGE_UM) } else { body.detail.rim_um };
-    rim::thin_rim(&mut absorbance, &coverage, rim_um / pixel_um);
-    rim::slope_rim(&mut absorbance, &plan.outline, cell);
-    let nucleus = [0, 1].map(|axis| plan.centre[axis] + body.nucleus.off_centre[axis] * body.radius_um / pixel_um);
-    let mut canvas = vec![0.0; absorbance.values.len() + wrinkles::LANES];
-    wrinkles.add(&mut absorbance, &coverage, &mut canvas);
-    let inner = endoplasm::add_endoplasm(&mut absorbance, &plan.outline, nucleus, cell);
-    halo::add_halo(&mut absorbance, nucleus, cell);
-    detail::add_detail(&mut absorbance, &coverage, inner, cell, &mut rng)?;
-    let lines = &mut canvas[..coverage.values.len()];
-    detail::add_cytoskeleton(&mut absorbance, &plan.outline, cell, lines, &mut rng)?;
-    degeneration::add(&mut absorbance, &coverage, cell);
-    specks::add_specks(&mut absorbance, cell);
-    specks::add_granules(&mut absorbance, body.detail.granules, pixel_um, &mut rng);
+    let coverage = covered_area(&outlines, &plan.creases, &wrinkles, cell, &mut rng);
+    let mut thickness = sheet_thickness(&plan, sheet, &coverage, cell)?;
+    add_details(&mut thickness, &coverage, &plan, &wrinkles, cell, &mut rng)?;
     // Eq. 12: A = κ·c·l.
+    let mut absorbance = thickness;
     let strength = body.cytoplasm_absorbance.max(MIN_ABSORBANCE) as f32;
     absorbance.values.iter_mut().zip(&coverage.values).for_each(|(value, cover)| *value *= cover * strength);
     let step = scene.grid().width / scene.sheet_grid().width;
@@ -260,6 +206,108 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
     let whole = Piece::whole(absorbance, coverage, area_px, body.dyes);
     let cytoplasm = Piece { part: Part::Cytoplasm, step, phase_rad, ..whole };
     Ok(Phantom { pieces: vec![cytoplasm, plan.nucleus], traits: traits(body) })
+}
+
+/// Returns the outlines of the parts of a cell after folding: the part that stays, and the flaps on it.
+fn folded_outlines(plan: &CellPlan) -> Result<Vec<Vec<Point>>, ErrorKind> {
+    let mut outlines = vec![plan.outline.clone()];
+    for crease in &plan.creases {
+        let folded = outlines.iter().map(|outline| crease_outline(outline, crease)).collect::<Result<Vec<_>, _>>();
+        outlines = folded?.concat();
+    }
+    Ok(outlines)
+}
+
+/// Returns the coverage of pixels by a cell whose parts have these outlines, with a rough rim. Creases are smooth.
+fn covered_area(
+    outlines: &[Vec<Point>],
+    creases: &[Crease],
+    wrinkles: &Wrinkles,
+    cell: &CellContext<'_>,
+    rng: &mut Stream,
+) -> Tile {
+    let pixel_um = cell.pixel_um();
+    let roughness = |p: Point| {
+        let on_crease = creases.iter().any(|crease| crease.distance_beyond(p) > 0.0);
+        if on_crease { 0.0 } else { wrinkles.roughness(p, pixel_um) }
+    };
+    let (depth_px, step_px) = (outline::fray_um(&cell.body.detail) / pixel_um, RIM_STEP_UM / pixel_um);
+    let roughened = |piece: &Vec<Point>| outline::roughened(piece, depth_px, step_px, roughness, rng);
+    let rough: Vec<Vec<Point>> = outlines.iter().map(roughened).collect();
+    let mut coverage = Tile::around(rough.iter().flatten(), 3.0);
+    for piece in &rough {
+        coverage.cover(piece);
+    }
+    coverage
+}
+
+/// Returns the thickness of the folded sheet of a cell, which decreases towards the rim. It is relative to the flat
+/// sheet.
+fn sheet_thickness(
+    plan: &CellPlan,
+    sheet: Option<Sheet>,
+    coverage: &Tile,
+    cell: &CellContext<'_>,
+) -> Result<Tile, ErrorKind> {
+    let (body, pixel_um) = (cell.body, cell.pixel_um());
+    let (detail, radius_px) = (&body.detail, body.radius_um / pixel_um);
+    let profile = &plan.class.class.cytoplasm.rim_to_centre;
+    // Width of the marginal zone in radii of the cell, the unit of `depth`.
+    let zone_width = detail.rim_um / body.radius_um;
+    let thinned = |depth: f64, thinning: fn(f64) -> f64| {
+        interpolate(profile, depth) * if zone_width > 0.0 { thinning(depth / zone_width) } else { 1.0 }
+    };
+    let mut thickness = coverage.blank();
+    // A folded cell is thin at the rim of the sheet, part of which lies on the cell. Its edge, with the creases, is
+    // soft in a narrower zone.
+    let folded = sheet.is_some() && !plan.creases.is_empty();
+    match sheet {
+        Some(mut sheet) => {
+            for crease in &plan.creases {
+                sheet.fold(crease)?;
+            }
+            let view = PixelGrid { origin: [thickness.origin[0] as f64, thickness.origin[1] as f64], pixel_size: 1.0 };
+            let thinning = if folded { rim::thinning } else { rim::beyond_zone };
+            let at_radius = |radius| thinned(1.0 - radius, thinning);
+            sheet.thickness_into(&mut thickness.values, coverage.width, &view, at_radius);
+            ridges::limit_ridges(&mut thickness, detail.ridges, pixel_um);
+        }
+        None => {
+            let at_depth = |depth| thinned(depth, rim::beyond_zone);
+            flat(&mut thickness, coverage, plan.centre, radius_px, at_depth);
+        }
+    }
+    detail::apply_gradient(&mut thickness, plan.centre, radius_px, detail.thickness_gradient);
+    let zone_um = if folded { detail.rim_um.min(FOLD_EDGE_UM) } else { detail.rim_um };
+    rim::thin_rim(&mut thickness, coverage, zone_um / pixel_um);
+    rim::slope_rim(&mut thickness, &plan.outline, cell);
+    Ok(thickness)
+}
+
+/// Adds wrinkles, endoplasm, halo, clouds, texture, fibres, material of degeneration, specks and granules to the
+/// thickness of a sheet. Dark material counts as the thickness of cytoplasm that absorbs as much.
+fn add_details(
+    thickness: &mut Tile,
+    coverage: &Tile,
+    plan: &CellPlan,
+    wrinkles: &Wrinkles,
+    cell: &CellContext<'_>,
+    rng: &mut Stream,
+) -> Result<(), ErrorKind> {
+    let (body, pixel_um) = (cell.body, cell.pixel_um());
+    let nucleus = [0, 1].map(|axis| plan.centre[axis] + body.nucleus.off_centre[axis] * body.radius_um / pixel_um);
+    // An image of zeros for wrinkles, which leave it as it was, then for fibres.
+    let mut canvas = vec![0.0; thickness.values.len() + wrinkles::LANES];
+    wrinkles.add(thickness, coverage, &mut canvas);
+    let inner = endoplasm::add_endoplasm(thickness, &plan.outline, nucleus, cell);
+    halo::add_halo(thickness, nucleus, cell);
+    detail::add_clouds_and_texture(thickness, coverage, inner, cell, rng)?;
+    let lines = &mut canvas[..coverage.values.len()];
+    detail::add_cytoskeleton(thickness, &plan.outline, cell, lines, rng)?;
+    degeneration::add(thickness, coverage, cell);
+    specks::add_specks(thickness, cell);
+    specks::add_granules(thickness, body.detail.granules, pixel_um, rng);
+    Ok(())
 }
 
 /// Removes the cytoplasm that a nucleus displaces, in proportion to the thickness of the nucleus: its absorbance
@@ -286,11 +334,11 @@ fn traits(body: &CellBody) -> Vec<Trait> {
     [fold, koilocytic, granular, pyknotic, wrinkled].into_iter().flatten().collect()
 }
 
-/// Computes the thickness of a sheet without folds, a function of the distance from the rim in radii.
-fn flat(absorbance: &mut Tile, coverage: &Tile, centre: Point, radius: f64, thickness: impl Fn(f64) -> f64) {
+/// Writes the thickness of a sheet without folds, a function of the distance from the rim in radii, into a tile.
+fn flat(tile: &mut Tile, coverage: &Tile, centre: Point, radius: f64, thickness: impl Fn(f64) -> f64) {
     let cover = &coverage.values;
     let mut index = 0;
-    absorbance.for_each(|p, value| {
+    tile.for_each(|p, value| {
         if cover[index] > 0.0 {
             let (dx, dy) = (p[0] - centre[0], p[1] - centre[1]);
             *value = thickness(1.0 - ((dx * dx + dy * dy).sqrt() / radius).min(1.0)) as f32;

@@ -1,7 +1,10 @@
 //! Outlines of cytoplasm: angularity, notches, protrusions, and a frayed rim.
 
+use portable_numerics::rounding::round_to_count;
+
+use super::autoregression::Autoregression;
 use crate::key::Stream;
-use crate::phantom::tile::{Point, area};
+use crate::phantom::tile::{Point, area, radius_of};
 use crate::random;
 use crate::scene::cell::CellDetail;
 
@@ -40,7 +43,7 @@ pub(super) fn shaped(outline: Vec<Point>, detail: &CellDetail, rng: &mut Stream)
     let before = area(&outline);
     let middle = fsd_shape::centroid(&outline);
     let mut shape = simple(angular(&outline, detail.angularity, rng)).unwrap_or(outline);
-    let radius = (before / core::f64::consts::PI).sqrt();
+    let radius = radius_of(before);
     for (count, [low, high], sign) in [(detail.notches, NOTCH, -1.0), (detail.protrusions, PROTRUSION, 1.0)] {
         for _ in 0..count {
             let depth = sign * radius * low * libm::pow(high / low, random::between(0.0, 1.0, rng));
@@ -202,6 +205,15 @@ const POINTED: f64 = 0.25;
 /// Standard deviation of the logarithm of the roughness along a rim: parts of it are smooth and others torn.
 const UNEVENNESS: f64 = 0.7;
 
+/// Correlation of the unevenness of a rim at two neighbouring points, 0.375 µm apart.
+const UNEVENNESS_MEMORY: f64 = 0.985;
+
+/// Correlation of the roughness of a scale below a micrometre at these points.
+const FINE_MEMORY: f64 = 0.6;
+
+/// Correlation of the roughness of a scale of a few micrometres at these points.
+const COARSE_MEMORY: f64 = 0.88;
+
 /// Returns an outline with irregular displacements, the frayed rim of a cell. `roughness` is a factor on them at each
 /// point.
 pub(super) fn roughened(
@@ -214,26 +226,23 @@ pub(super) fn roughened(
     if depth_px < 0.05 || outline.len() < 3 {
         return outline.to_vec();
     }
-    let count = random::count(fsd_shape::perimeter(outline) / step_px).max(outline.len());
+    let count = round_to_count(fsd_shape::perimeter(outline) / step_px).max(outline.len());
     let fine = fsd_shape::resample_along(outline, count);
-    // First-order autoregressions: the slow one modulates the amplitude of the others.
-    let [mut slow, mut fast, mut medium] = [(); 3].map(|()| random::normal(rng));
+    let [mut unevenness, mut fine_scale, mut coarse_scale] =
+        [UNEVENNESS_MEMORY, FINE_MEMORY, COARSE_MEMORY].map(|memory| Autoregression::new(memory, 1.0, rng));
     // Outwards is on the left of a path of positive area, where y points down.
     let outwards = 1.0_f64.copysign(fsd_shape::signed_area(outline));
-    let step = |state: f64, memory: f64, rng: &mut Stream| {
-        memory * state + (1.0 - memory * memory).sqrt() * random::normal(rng)
-    };
     (0..count)
         .map(|i| {
-            slow = step(slow, 0.985, rng);
-            fast = step(fast, 0.6, rng);
-            medium = step(medium, 0.88, rng);
+            let uneven = unevenness.next(rng);
+            let fine_roughness = fine_scale.next(rng);
+            let coarse_roughness = coarse_scale.next(rng);
             let [before, here, after] = [fine[(i + count - 1) % count], fine[i], fine[(i + 1) % count]];
             let (tx, ty) = (after[0] - before[0], after[1] - before[1]);
             let length = (tx * tx + ty * ty).sqrt().max(1e-9);
-            let factor = libm::exp(UNEVENNESS * slow - 0.5 * UNEVENNESS * UNEVENNESS);
+            let factor = libm::exp(UNEVENNESS * uneven - 0.5 * UNEVENNESS * UNEVENNESS);
             let amplitude = AMPLITUDE * factor * roughness(here);
-            let rough = (FINE_SCALE * fast + medium) / BOTH_SCALES;
+            let rough = (FINE_SCALE * fine_roughness + coarse_roughness) / BOTH_SCALES;
             let pointed = (rough + POINTED * (rough * rough - 1.0)) / (1.0 + 2.0 * POINTED * POINTED).sqrt();
             let push = outwards * depth_px * (BOTH_SCALES * amplitude * pointed).clamp(-2.5, 2.5);
             [here[0] + push * ty / length, here[1] - push * tx / length]

@@ -22,14 +22,14 @@ pub(super) fn limit_ridges(thickness: &mut Tile, limit: f64, pixel_um: f64) {
         return;
     }
     let mut opened = thickness.values.clone();
-    fold_squares(&mut opened, thickness.width, radius, minima);
-    fold_squares(&mut opened, thickness.width, radius, maxima);
+    over_squares(&mut opened, thickness.width, radius, minima);
+    over_squares(&mut opened, thickness.width, radius, maxima);
     // A limit of 0 must not divide 0 by 0.
     soften(&mut thickness.values, &opened, (limit as f32).max(1e-6));
 }
 
 /// Joins each value with all others in the square of 2·`radius` + 1 pixels around it.
-fn fold_squares(values: &mut [f32], width: usize, radius: usize, join: fn(&mut [f32], &[f32])) {
+fn over_squares(values: &mut [f32], width: usize, radius: usize, join: fn(&mut [f32], &[f32])) {
     let mut source = vec![0.0; width];
     for row in values.chunks_exact_mut(width) {
         source.copy_from_slice(row);
@@ -115,8 +115,8 @@ mod tests {
     fn an_opening_is_the_largest_minimum_of_the_squares_that_contain_a_pixel() {
         let values = tile(|x, y| ((x * 37 + y * 61) % 23) as f32);
         let mut opened = values.values.clone();
-        fold_squares(&mut opened, 20, 2, minima);
-        fold_squares(&mut opened, 20, 2, maxima);
+        over_squares(&mut opened, 20, 2, minima);
+        over_squares(&mut opened, 20, 2, maxima);
         let around = |at: usize| at.saturating_sub(2)..(at + 3).min(20);
         let minimum = |x: usize, y: usize| {
             let square = around(y).flat_map(|v| around(x).map(move |u| (u, v)));

@@ -1,25 +1,24 @@
 //! The rim of a cell: how the thickness of the cytoplasm increases from its outline.
 
 use multiversion::multiversion;
+use portable_numerics::rounding::round_to_count;
 
 use super::coarse_tile::CoarseTile;
 use crate::phantom::box_sums::for_each_row_of_sums;
 use crate::phantom::cell_context::CellContext;
 use crate::phantom::noise_fields::FieldSampler;
 use crate::phantom::tile::{Point, Tile};
-use crate::random;
 
-/// Thins a zone of this width, px, along the outline of a cell; the factor is 1 farther inside. The remaining increase
-/// of the thickness, [`beyond_zone`], depends on the relative radius.
-pub(super) fn thin_rim(absorbance: &mut Tile, coverage: &Tile, distance_px: f64) {
-    let radius = random::count(distance_px);
+/// Thins the marginal zone, of width `zone_px`, along the outline of a cell; the factor is 1 farther inside. The
+/// remaining increase of the thickness, [`beyond_zone`], depends on the relative radius.
+pub(super) fn thin_rim(thickness: &mut Tile, coverage: &Tile, zone_px: f64) {
+    let radius = round_to_count(zone_px);
     if radius == 0 {
         return;
     }
-    // At a straight rim, the mean coverage of a box is 0.5. One radius inside the rim, it is 1.
     let (width, side) = (coverage.width, 2 * radius + 1);
     let weight = 1.0 / (side as f32 * side as f32);
-    let mut rows = absorbance.values.chunks_exact_mut(width);
+    let mut rows = thickness.values.chunks_exact_mut(width);
     for_each_row_of_sums(coverage, radius, |sums| {
         if let Some(values) = rows.next() {
             thin(values, sums, weight);
@@ -38,16 +37,16 @@ const SLOPE: f32 = 0.7;
 const SLOPE_CHANGES_UM: f64 = 5.0;
 
 /// Thins a broad zone along parts of the rim, whose thickness increases gradually.
-pub(super) fn slope_rim(absorbance: &mut Tile, outline: &[Point], cell: &CellContext<'_>) {
+pub(super) fn slope_rim(thickness: &mut Tile, outline: &[Point], cell: &CellContext<'_>) {
     if cell.body.detail.rim_um <= 0.0 {
         return;
     }
     let (pixel_um, mut rng) = (cell.pixel_um(), cell.stream("slope"));
-    let mut zone = CoarseTile::smoothed(absorbance, outline, SLOPE_UM / pixel_um);
+    let mut zone = CoarseTile::smoothed(thickness, outline, SLOPE_UM / pixel_um);
     let sampler = FieldSampler::clouds(SLOPE_CHANGES_UM / pixel_um, &mut rng);
-    let mut noise = CoarseTile::noise(absorbance, cell.noise_fields.clouds(), &sampler);
-    let [mut smoothed, mut slopes] = [(); 2].map(|()| vec![0.0; absorbance.width]);
-    for (y, row) in absorbance.values.chunks_exact_mut(smoothed.len()).enumerate() {
+    let mut noise = CoarseTile::noise(thickness, cell.noise_fields.clouds(), &sampler);
+    let [mut smoothed, mut slopes] = [(); 2].map(|()| vec![0.0; thickness.width]);
+    for (y, row) in thickness.values.chunks_exact_mut(smoothed.len()).enumerate() {
         zone.row_into(&mut smoothed, y);
         noise.row_into(&mut slopes, y);
         slope_row(row, &smoothed, &slopes);
@@ -59,8 +58,9 @@ pub(super) fn slope_rim(absorbance: &mut Tile, outline: &[Point], cell: &CellCon
 #[multiversion(targets = "simd")]
 fn slope_row(row: &mut [f32], smoothed: &[f32], noise: &[f32]) {
     for ((value, smoothed), noise) in row.iter_mut().zip(smoothed).zip(noise) {
-        let beyond = (2.0 - 2.0 * smoothed).clamp(0.0, 1.0);
-        *value *= 1.0 - SLOPE * beyond * (0.5 + 0.5 * noise).clamp(0.0, 1.0);
+        // 1 at the outline, 0 inside.
+        let near_rim = (2.0 - 2.0 * smoothed).clamp(0.0, 1.0);
+        *value *= 1.0 - SLOPE * near_rim * (0.5 + 0.5 * noise).clamp(0.0, 1.0);
     }
 }
 
@@ -81,11 +81,22 @@ pub(super) fn beyond_zone(distance: f64) -> f64 {
 /// its inner border, by 0.01 at most.
 const ZONE: [f32; 3] = [2.262_7, -1.94, 0.677_3];
 
+/// Returns the depth of a pixel in the zone along the outline of a cell: 0 at the outline, 1 at half the side of a box
+/// from it and farther inside. `sum` is the sum of the coverage over the box around the pixel, `weight` is 1 / the
+/// number of pixels of the box.
+///
+/// At a straight outline, the mean coverage of a box is 0.5; half a side farther inside, it is 1. Inlined, so that it
+/// is compiled for the caller's instruction set.
+#[inline(always)]
+pub(super) fn depth_in_zone(sum: f32, weight: f32) -> f32 {
+    (2.0 * weight * sum - 1.0).clamp(0.0, 1.0)
+}
+
 /// Multiplies values by a factor that increases from 0 at the rim to 1 at one radius inside: [`ZONE`].
 #[multiversion(targets = "simd")]
 fn thin(values: &mut [f32], sums: &[f32], weight: f32) {
     for (value, sum) in values.iter_mut().zip(sums) {
-        let inside = (2.0 * weight * sum - 1.0).clamp(0.0, 1.0);
+        let inside = depth_in_zone(*sum, weight);
         *value *= inside * (ZONE[0] + inside * (ZONE[1] + inside * ZONE[2]));
     }
 }

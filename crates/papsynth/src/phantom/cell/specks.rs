@@ -1,6 +1,8 @@
-//! Granules and specks of cytoplasm: dark dots and short rods.
+//! Granules and specks of cytoplasm: dark dots and short rods. Each adds the thickness of cytoplasm that absorbs as
+//! much.
 
 use portable_numerics::elementary::exp_f32;
+use portable_numerics::rounding::round_to_count;
 
 use crate::key::Stream;
 use crate::phantom::cell_context::CellContext;
@@ -10,15 +12,15 @@ use crate::random;
 /// Standard deviation of the absorbance profile of a granule or speck, µm.
 const GRANULE_UM: f64 = 0.28;
 
-/// Absorbance of a granule relative to the cytoplasm.
+/// Absorbance of a granule relative to the flat sheet.
 const GRANULE: f64 = 0.55;
 
 /// Adds keratohyalin granules: small dark dots throughout the cell.
-pub(super) fn add_granules(absorbance: &mut Tile, per_100_um2: f64, pixel_um: f64, rng: &mut Stream) {
-    for _ in 0..count_in_box(absorbance, per_100_um2, pixel_um, rng) {
-        let at = [absorbance.width, absorbance.height()].map(|side| random::between(0.0, side as f64, rng));
+pub(super) fn add_granules(thickness: &mut Tile, per_100_um2: f64, pixel_um: f64, rng: &mut Stream) {
+    for _ in 0..count_in_box(thickness, per_100_um2, pixel_um, rng) {
+        let at = [thickness.width, thickness.height()].map(|side| random::between(0.0, side as f64, rng));
         let sigma = GRANULE_UM / pixel_um * random::between(0.6, 1.3, rng);
-        Rod { ends: [at; 2], sigma, strength: GRANULE * random::between(0.3, 1.5, rng) }.draw(absorbance);
+        Rod { ends: [at; 2], sigma, strength: GRANULE * random::between(0.3, 1.5, rng) }.draw(thickness);
     }
 }
 
@@ -30,18 +32,18 @@ const GROUP_UM: f64 = 3.0;
 const RODS: f64 = 0.6;
 const ROD_UM: [f64; 2] = [0.5, 2.5];
 
-/// Mean absorbance of a speck relative to the cytoplasm, and the maximum.
+/// Mean absorbance of a speck relative to the flat sheet, and the maximum.
 const SPECK: [f64; 2] = [0.32, 1.3];
 
 /// Adds specks: dark dots and short rods, in groups. The rods of a cell have similar directions.
-pub(super) fn add_specks(absorbance: &mut Tile, cell: &CellContext<'_>) {
+pub(super) fn add_specks(thickness: &mut Tile, cell: &CellContext<'_>) {
     /// Standard deviation of the directions, radians.
     const SPREAD: f64 = 0.7;
     let (pixel_um, rng) = (cell.pixel_um(), &mut cell.stream("specks"));
     let direction = random::direction(rng);
-    let sides = [absorbance.width, absorbance.height()];
+    let sides = [thickness.width, thickness.height()];
     let mut at = [0.0; 2];
-    for index in 0..count_in_box(absorbance, cell.body.detail.specks, pixel_um, rng) {
+    for index in 0..count_in_box(thickness, cell.body.detail.specks, pixel_um, rng) {
         at = match index > 0 && random::chance(GROUPED, rng) {
             true => at.map(|x| x + GROUP_UM / pixel_um * random::normal(rng)),
             false => sides.map(|side| random::between(0.0, side as f64, rng)),
@@ -53,7 +55,7 @@ pub(super) fn add_specks(absorbance: &mut Tile, cell: &CellContext<'_>) {
         let ends = [[at[0] - half[0], at[1] - half[1]], [at[0] + half[0], at[1] + half[1]]];
         let sigma = GRANULE_UM / pixel_um * random::between(0.6, 1.3, rng);
         let strength = (-SPECK[0] * libm::log(1.0 - random::uniform(rng))).min(SPECK[1]);
-        Rod { ends, sigma, strength }.draw(absorbance);
+        Rod { ends, sigma, strength }.draw(thickness);
     }
 }
 
@@ -63,7 +65,7 @@ fn count_in_box(like: &Tile, per_100_um2: f64, pixel_um: f64, rng: &mut Stream) 
         return 0;
     }
     let expected = per_100_um2 * (like.width * like.height()) as f64 * pixel_um * pixel_um / 100.0;
-    random::count(expected + random::uniform(rng) - 0.5)
+    round_to_count(expected + random::uniform(rng) - 0.5)
 }
 
 /// A dark rod: a segment with a normal profile around it.
@@ -72,23 +74,23 @@ struct Rod {
     ends: [Point; 2],
     /// Standard deviation of the profile, px.
     sigma: f64,
-    /// Absorbance on the segment relative to the cytoplasm.
+    /// Absorbance on the segment relative to the flat sheet.
     strength: f64,
 }
 
 impl Rod {
-    fn draw(&self, absorbance: &mut Tile) {
+    fn draw(&self, thickness: &mut Tile) {
         let [from, to] = self.ends;
         let along = [to[0] - from[0], to[1] - from[1]];
         let square = (along[0] * along[0] + along[1] * along[1]).max(1e-12);
         let reach = 3.0 * self.sigma;
-        let sides = [absorbance.width, absorbance.height()];
+        let sides = [thickness.width, thickness.height()];
         let [columns, rows] = [0, 1].map(|axis| {
             let whole = |at: f64| at.clamp(0.0, sides[axis] as f64) as usize;
             whole((from[axis].min(to[axis]) - reach).ceil())..whole(from[axis].max(to[axis]) + reach + 1.0)
         });
         for y in rows {
-            let row = &mut absorbance.values[y * sides[0]..][columns.clone()];
+            let row = &mut thickness.values[y * sides[0]..][columns.clone()];
             for (value, x) in row.iter_mut().zip(columns.clone()) {
                 let off = [x as f64 - from[0], y as f64 - from[1]];
                 let t = ((off[0] * along[0] + off[1] * along[1]) / square).clamp(0.0, 1.0);

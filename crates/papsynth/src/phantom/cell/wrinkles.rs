@@ -4,10 +4,12 @@
 mod path;
 mod segment;
 
-use path::{Autoregression, across, along_rim, at_steps, beside, forked, part, side_of};
+use path::{MEMORY, across_cell, along_rim, at_steps, beside, forked, random_part, side_of};
+use portable_numerics::rounding::round_to_count;
 pub(super) use segment::LANES;
 use segment::{PLEAT, RIDGE, SLOPE_WIDTH, Segment, add_and_clear, paint};
 
+use super::autoregression::Autoregression;
 use crate::key::Stream;
 use crate::phantom::cell_context::CellContext;
 use crate::phantom::tile::{Point, Tile};
@@ -30,26 +32,28 @@ const ROLLED_INSET: [f64; 2] = [0.015, 0.08];
 const EDGE_THICKNESS: [f64; 2] = [0.4, 2.0];
 const EDGE_UM: [f64; 2] = [0.35, 0.8];
 
-/// Fraction of the other wrinkles that follow the rim.
+/// Fraction of the wrinkles other than rolled stretches that follow the rim.
 const ALONG_RIM: f64 = 0.4;
 
 /// Width from which a ridge has its full thickness; a narrower one is thinner in proportion. Set by eye: most
 /// dark folds of real cells are wide.
 const WIDE_UM: f64 = 0.6;
 
-/// Thickness and width of another wrinkle relative to the mean: minimum, maximum.
+/// Thickness of a wrinkle other than a rolled stretch, relative to `wrinkle_thickness` of its cell: minimum, maximum.
 const THICKNESS: [f64; 2] = [0.4, 1.6];
+/// Width of a wrinkle other than a rolled stretch, relative to `wrinkle_um` of its cell: minimum, maximum.
 const WIDTH: [f64; 2] = [0.6, 1.6];
-/// Fraction of the remaining wrinkles that fork off a previous one.
+/// Fraction that fork off a previous wrinkle, of the wrinkles that neither are rolled stretches nor follow the rim. The
+/// rest of them begin at the rim and cross the cell.
 const FORKED: f64 = 0.35;
 
-/// Fraction of the other wrinkles that are pleats, if they are not bundles: two dark lines with a paler band between,
-/// instead of ridges. This and the next two numbers were set by eye, beside cells of real fields.
+/// Fraction of pleats among the wrinkles that are neither rolled stretches nor bundles: two dark lines with a paler
+/// band between, instead of a ridge. This and the next two numbers were set by eye, beside cells of real fields.
 const PLEATS: f64 = 0.08;
 /// Width of a pleat relative to that of a ridge: minimum, maximum.
 const PLEAT_WIDTH: [f64; 2] = [0.8, 2.5];
-/// Fraction of wrinkles that are a bundle of fine ridges side by side, instead of one ridge or pleat: of those that
-/// follow the rim, and of others, rolled stretches of the rim included. These numbers and those of the next four
+/// Fraction of wrinkles that are a bundle of fine ridges side by side, instead of one ridge or pleat: of the wrinkles
+/// that follow the rim, and of all others, which include rolled stretches. These numbers and those of the next four
 /// constants were set by eye, beside cells of real fields.
 const BUNDLED: [f64; 2] = [0.1, 0.35];
 /// Number of ridges beside the first one of a bundle: minimum, and range above it.
@@ -77,7 +81,7 @@ struct Wrinkle {
 pub(super) struct Wrinkles {
     /// Rolled stretches of the rim.
     rolled: Vec<Wrinkle>,
-    /// Wrinkles, and ridges along the edges of flaps.
+    /// All other wrinkles, and ridges along the edges of flaps.
     others: Vec<Wrinkle>,
 }
 
@@ -91,7 +95,7 @@ impl Wrinkles {
             return wrinkles;
         }
         let step = STEP_UM / pixel_um;
-        let rim = fsd_shape::resample_along(outline, random::count(fsd_shape::perimeter(outline) / step).max(8));
+        let rim = fsd_shape::resample_along(outline, round_to_count(fsd_shape::perimeter(outline) / step).max(8));
         for path in edges.iter().map(|edge| at_steps(edge, step)).filter(|path| path.len() > 1) {
             let kind = WrinkleKind { width_um: EDGE_UM, thickness: EDGE_THICKNESS, pleat: false };
             let profile = WrinkleProfile::new(path.len(), &kind, cell, rng);
@@ -111,7 +115,7 @@ impl Wrinkles {
                 let stem = &others[random::below(others.len(), rng)];
                 forked(&stem.path, outline, step, rng)
             } else {
-                across(outline, step, cell.streaks, rng)
+                across_cell(outline, step, cell.across_streaks_rad, rng)
             };
             let kind = if rolled {
                 WrinkleKind { width_um: ROLLED_UM, thickness: ROLLED_THICKNESS, pleat: false }
@@ -179,9 +183,9 @@ fn bundle(path: Vec<Point>, side: f64, kind: &WrinkleKind, cell: &CellContext<'_
     let mut ridges = Vec::new();
     for _ in 0..BESIDE[0] + random::below(BESIDE[1], rng) {
         distance += side * random::between(APART_UM[0], APART_UM[1], rng) / pixel_um;
-        let path = part(&beside(&path, distance, fan), random::between(SHORTEST, 1.0, rng), rng);
+        let path = random_part(&beside(&path, distance, fan), random::between(SHORTEST, 1.0, rng), rng);
         let profile = WrinkleProfile::new(path.len(), kind, cell, rng);
-        let relative = of_width(profile.width * pixel_um) / of_width(first.width * pixel_um);
+        let relative = relative_thickness(profile.width * pixel_um) / relative_thickness(first.width * pixel_um);
         let strength = first.strength * relative * random::between(FAINTER[0], FAINTER[1], rng);
         ridges.push(Wrinkle { path, profile: WrinkleProfile { strength, side, ..profile } });
     }
@@ -191,12 +195,12 @@ fn bundle(path: Vec<Point>, side: f64, kind: &WrinkleKind, cell: &CellContext<'_
 
 /// Draws random factors with a mean of about 1 and a correlation length of a few micrometres.
 fn random_factors(count: usize, rng: &mut Stream) -> Vec<f64> {
-    let mut noise = Autoregression::new(0.35, rng);
+    let mut noise = Autoregression::new(MEMORY, 0.35, rng);
     (0..count).map(|_| (0.9 + noise.next(rng)).clamp(0.0, 2.5)).collect()
 }
 
 /// Returns the thickness of a ridge of this width relative to that of wide ones.
-fn of_width(width_um: f64) -> f64 {
+fn relative_thickness(width_um: f64) -> f64 {
     (width_um / WIDE_UM).min(1.0)
 }
 
@@ -248,7 +252,7 @@ impl WrinkleProfile {
         Self {
             width: factor * width_um / cell.pixel_um(),
             pleat: kind.pleat,
-            strength: cell.body.detail.wrinkle_thickness * thickness * of_width(factor * width_um),
+            strength: cell.body.detail.wrinkle_thickness * thickness * relative_thickness(factor * width_um),
             side: if random::chance(0.5, rng) { 1.0 } else { -1.0 },
             rise: random::between(0.05, TAPER, rng),
             fall: random::between(0.2, 1.0 - TAPER, rng),
@@ -274,9 +278,9 @@ impl WrinkleProfile {
             });
             let strengths = [0, 1].map(|end| self.strength * rises[end] * self.factors[ends[end]]);
             if strengths[0] + strengths[1] > 0.0 {
-                let of_crest = self.width * (END_WIDTH + (1.0 - END_WIDTH) * 0.5 * (rises[0] + rises[1]));
+                let crest_width = self.width * (END_WIDTH + (1.0 - END_WIDTH) * 0.5 * (rises[0] + rises[1]));
                 let ends = ends.map(|index| [0, 1].map(|axis| path[index][axis] - origin[axis]));
-                paint(&self.segment(ends, of_crest, strengths), canvas, width, &mut touched);
+                paint(&self.segment(ends, crest_width, strengths), canvas, width, &mut touched);
             }
         }
         for (y, columns) in touched.into_iter().enumerate().filter(|(_, columns)| !columns.is_empty()) {
@@ -314,7 +318,7 @@ mod tests {
 
     #[test]
     fn narrow_ridges_are_thinner() {
-        assert_eq!([0.3, 0.6, 1.2].map(of_width), [0.5, 1.0, 1.0]);
+        assert_eq!([0.3, 0.6, 1.2].map(relative_thickness), [0.5, 1.0, 1.0]);
     }
 
     #[test]

@@ -1,7 +1,10 @@
 //! Paths of wrinkles: along the rim, across the cell, forked, and beside another one.
 
+use portable_numerics::rounding::round_to_count;
+
 use crate::key::Stream;
-use crate::phantom::tile::{Point, area};
+use crate::phantom::cell::autoregression::Autoregression;
+use crate::phantom::tile::{Point, area, radius_of};
 use crate::random;
 
 /// Length over which a path along the rim is averaged, relative to its mean distance from the rim: paths farther inside
@@ -14,8 +17,11 @@ const DEVIATION: f64 = 0.5;
 /// Where wrinkles across a cell begin: distance from the middle relative to that of the rim. Set by eye.
 const NEAR_RIM: f64 = 0.97;
 
-/// Returns a random part of a path: a fraction of its points, at least three of them if it has as many.
-pub(super) fn part(path: &[Point], fraction: f64, rng: &mut Stream) -> Vec<Point> {
+/// Correlation of the noise at neighbouring points of a wrinkle, half a micrometre apart.
+pub(super) const MEMORY: f64 = 0.93;
+
+/// Draws a part of a path: a fraction of its points, at least three of them if it has as many.
+pub(super) fn random_part(path: &[Point], fraction: f64, rng: &mut Stream) -> Vec<Point> {
     let count = ((fraction * path.len() as f64) as usize).max(3).min(path.len());
     let start = random::below(path.len() - count + 1, rng);
     path[start..start + count].to_vec()
@@ -66,11 +72,11 @@ pub(super) fn at_steps(path: &[Point], step: f64) -> Vec<Point> {
 /// from end to end. `fine` is the outline at equal steps.
 pub(super) fn along_rim(outline: &[Point], fine: &[Point], inset: f64, drift: f64, rng: &mut Stream) -> Vec<Point> {
     let middle = fsd_shape::centroid(outline);
-    let length = random::count(fine.len() as f64 * random::between(0.06, 0.45, rng)).max(4);
+    let length = round_to_count(fine.len() as f64 * random::between(0.06, 0.45, rng)).max(4);
     let first = random::below(fine.len(), rng);
-    let mut noise = Autoregression::new(0.022, rng);
+    let mut noise = Autoregression::new(MEMORY, 0.022, rng);
     // A circle of n points has n/2π points per radius.
-    let reach = random::count(0.5 * SMOOTHED * inset * fine.len() as f64 / core::f64::consts::TAU);
+    let reach = round_to_count(0.5 * SMOOTHED * inset * fine.len() as f64 / core::f64::consts::TAU);
     (0..length)
         .map(|i| {
             let p = mean_near(fine, first + i, reach);
@@ -88,15 +94,16 @@ fn mean_near(line: &[Point], index: usize, reach: usize) -> Point {
     sum.map(|sum| sum / (2 * reach + 1) as f64)
 }
 
-/// Draws a curved path from the rim into the cell. `streaks` is the direction across the streaks of the cell.
-pub(super) fn across(outline: &[Point], step: f64, streaks: f64, rng: &mut Stream) -> Vec<Point> {
+/// Draws a curved path from the rim into the cell, about along the streaks of the cell. `across_streaks_rad` is the
+/// direction across them.
+pub(super) fn across_cell(outline: &[Point], step: f64, across_streaks_rad: f64, rng: &mut Stream) -> Vec<Point> {
     let middle = fsd_shape::centroid(outline);
     let rim = outline[random::below(outline.len(), rng)];
     let start = [0, 1].map(|axis| middle[axis] + NEAR_RIM * (rim[axis] - middle[axis]));
-    let along = streaks + DEVIATION * random::normal(rng) + 0.5 * core::f64::consts::PI;
+    let along = across_streaks_rad + DEVIATION * random::normal(rng) + 0.5 * core::f64::consts::PI;
     let inwards = libm::cos(along) * (middle[0] - rim[0]) + libm::sin(along) * (middle[1] - rim[1]) >= 0.0;
     let along = if inwards { along } else { along + core::f64::consts::PI };
-    curved_path(start, along, radius_of(outline), step, rng)
+    curved_path(start, along, radius_of(area(outline)), step, rng)
 }
 
 /// Draws a curved path that leaves another one at an acute angle.
@@ -104,18 +111,14 @@ pub(super) fn forked(stem: &[Point], outline: &[Point], step: f64, rng: &mut Str
     let at = random::below(stem.len().saturating_sub(1), rng);
     let (a, b) = (stem[at], stem[(at + 1).min(stem.len() - 1)]);
     let turn = random::between(0.25, 0.9, rng) * if random::chance(0.5, rng) { 1.0 } else { -1.0 };
-    curved_path(a, libm::atan2(b[1] - a[1], b[0] - a[0]) + turn, radius_of(outline), step, rng)
-}
-
-fn radius_of(outline: &[Point]) -> f64 {
-    (area(outline) / core::f64::consts::PI).sqrt()
+    curved_path(a, libm::atan2(b[1] - a[1], b[0] - a[0]) + turn, radius_of(area(outline)), step, rng)
 }
 
 /// Draws a path of slowly changing curvature.
 fn curved_path(start: Point, direction: f64, radius: f64, step: f64, rng: &mut Stream) -> Vec<Point> {
-    let steps = random::count(random::between(0.4, 1.7, rng) * radius / step).max(4);
+    let steps = round_to_count(random::between(0.4, 1.7, rng) * radius / step).max(4);
     let mean = random::normal(rng) * 0.4 / radius;
-    let mut curvature = Autoregression::new(1.2 / radius, rng);
+    let mut curvature = Autoregression::new(MEMORY, 1.2 / radius, rng);
     let (mut at, mut heading) = (start, direction);
     (0..steps)
         .map(|_| {
@@ -124,26 +127,6 @@ fn curved_path(start: Point, direction: f64, radius: f64, step: f64, rng: &mut S
             at
         })
         .collect()
-}
-
-/// A first-order autoregression.
-pub(super) struct Autoregression {
-    state: f64,
-    sd: f64,
-}
-
-impl Autoregression {
-    const MEMORY: f64 = 0.93;
-
-    pub(super) fn new(sd: f64, rng: &mut Stream) -> Self {
-        Self { state: sd * random::normal(rng), sd }
-    }
-
-    pub(super) fn next(&mut self, rng: &mut Stream) -> f64 {
-        let fresh = (1.0 - Self::MEMORY * Self::MEMORY).sqrt();
-        self.state = Self::MEMORY * self.state + fresh * self.sd * random::normal(rng);
-        self.state
-    }
 }
 
 #[cfg(test)]
@@ -198,7 +181,7 @@ mod tests {
         let mut rng = Key { seed: 3, index: 0 }.stream("test", 0, "part");
         for (count, fraction, expected) in [(4, 0.35, 3), (40, 0.5, 20), (40, 1.0, 40), (2, 0.5, 2)] {
             let path: Vec<Point> = (0..count).map(|i| [f64::from(i), 0.0]).collect();
-            let part = part(&path, fraction, &mut rng);
+            let part = random_part(&path, fraction, &mut rng);
             assert_eq!(part.len(), expected);
             assert!(part.windows(2).all(|p| p[1][0] - p[0][0] == 1.0), "{part:?}");
         }
