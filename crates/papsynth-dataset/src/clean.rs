@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use serde::Serialize;
 
-use crate::dataset::{Manifest, nested_below, read_record, recorded_shards};
+use crate::dataset::{Manifest, named_map, nested_below, read_record, recorded_shards};
 use crate::error::Error;
 use crate::files::{Folder, Location, is_temporary, last_part};
 use crate::formats::names;
@@ -113,6 +113,8 @@ impl Owner {
         }
         let mut names: BTreeSet<String> = manifest.files.iter().map(|file| file.path.clone()).collect();
         names.insert(names::MANIFEST.to_owned());
+        // Also if the manifest does not list it: without the map, the recipe cannot be used.
+        names.extend(named_map(folder));
         for shard in shards {
             names.insert(names::record(shard));
             names.extend(read_record(folder, shard)?.files.into_iter().map(|file| file.path));

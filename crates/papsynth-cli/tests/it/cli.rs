@@ -316,6 +316,37 @@ fn invalid_layouts_are_rejected_before_a_file_is_written() {
     bench.good(&format!("generate deep/recipe.toml --out out --frames 1 {tiny}"));
 }
 
+#[test]
+fn data_sets_with_a_map_are_complete_and_keep_it() {
+    let bench = Bench::new("maps");
+    let tiny = TINY.replace("--set layout.kind=uniform", "");
+    bench.grey_png("left.png", 8, 8, |x, _| if x < 4 { 255 } else { 0 });
+    for kind in ["density-map", "labels"] {
+        fs::write(bench.path("recipe.toml"), format!("[layout]\nkind = \"{kind}\"\npath = \"left.png\"\n")).unwrap();
+        let generate = |out: &str, more: &str| {
+            bench.good(&format!("generate recipe.toml --out {kind}-{out} --frames 2 {more} {tiny}"));
+        };
+        generate("whole", "");
+        bench.good(&format!("verify {kind}-whole"));
+        generate("tasks", "--task 0/2");
+        generate("tasks", "--task 1/2");
+        bench.good(&format!("merge {kind}-tasks --frames 2"));
+        bench.good(&format!("verify {kind}-tasks"));
+        // An earlier merge of tasks left out the map.
+        let manifest = bench.path(&format!("{kind}-tasks/manifest.json"));
+        let text = fs::read_to_string(&manifest).unwrap();
+        let without: Vec<&str> = text.lines().filter(|line| !line.contains("layout-")).collect();
+        assert!(without.len() + 1 == text.lines().count(), "{text}");
+        fs::write(&manifest, without.join("\n") + "\n").unwrap();
+        assert_eq!(bench.run(&format!("verify {kind}-tasks")).code, 2);
+        bench.good(&format!("clean {kind}-tasks --untracked"));
+        bench.good(&format!("merge {kind}-tasks --frames 2"));
+        assert_eq!(fs::read_to_string(&manifest).unwrap(), text);
+        bench.good(&format!("convert {kind}-tasks --out {kind}-converted --format cellpose"));
+        bench.good(&format!("verify {kind}-converted"));
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn write_errors_have_exit_code_74() {

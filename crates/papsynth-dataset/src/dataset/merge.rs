@@ -116,6 +116,8 @@ fn files(
 ) -> Result<Vec<FileRecord>, Error> {
     let folder = &dataset.folder;
     let mut merged = given;
+    // `croissant.json` lists them in this order.
+    merged.sort_by(|a, b| a.path.cmp(&b.path));
     if !shards.is_empty() {
         if dataset.layout.is_by_frame() {
             merged.push(process(names::TABLE, &|out| tables(folder, shards, out))?);

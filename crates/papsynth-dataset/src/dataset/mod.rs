@@ -31,6 +31,7 @@ pub use record::{Identity, ShardRecord};
 pub(crate) use record::{WRITER, is_inside};
 pub(crate) use record::{read_record, recorded_shards};
 pub use rgb_image::{RgbImage, write_png};
+pub(crate) use set::named_map;
 pub use set::{Dataset, Summary};
 pub use shard_writer::ShardWriter;
 pub use verify::{VerifyProgress, VerifyReport, verify, verify_with_progress};

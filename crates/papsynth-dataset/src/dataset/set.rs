@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
+use papsynth::recipe::{self, Recipe};
 use papsynth::truth::Truth;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -72,7 +73,9 @@ impl Dataset {
     pub(super) fn of(folder: Folder, manifest: Manifest) -> Self {
         let is_map =
             |file: &&FileRecord| !file.path.contains('/') && !names::OF_EVERY_SET.contains(&file.path.as_str());
-        let map = manifest.files.iter().find(is_map).map(|file| file.path.clone());
+        let listed = manifest.files.iter().find(is_map).map(|file| file.path.clone());
+        // The manifest lists no file before the first merge, and earlier merges of tasks did not list the map.
+        let map = listed.or_else(|| named_map(&folder));
         let Manifest { identity, layout, categories, .. } = manifest;
         Self { folder, identity, layout, categories, map, trusted: Arc::default(), thumbnails: Thumbnails::default() }
     }
@@ -168,7 +171,7 @@ impl Dataset {
         Ok(())
     }
 
-    /// Names of the input files.
+    /// Names of the input files. Before the first merge, the map is the one that the recipe names.
     pub(super) fn given(&self) -> impl Iterator<Item = &str> {
         [names::MODEL, names::RECIPE].into_iter().chain(self.map.as_deref())
     }
@@ -189,4 +192,19 @@ impl Dataset {
     pub(super) fn truth_in(&self, document: &Document, shard: u64, index: u64) -> Result<Truth, Error> {
         document.truth(index).map_err(Error::input(&self.folder.path(&names::coco(shard))))
     }
+}
+
+/// Returns the map that a recipe names.
+pub(super) fn map_of(recipe: &Recipe) -> Option<&String> {
+    match &recipe.layout {
+        recipe::Layout::DensityMap { path } | recipe::Layout::Labels(recipe::Labels { path, .. }) => Some(path),
+        _ => None,
+    }
+}
+
+/// Returns the map that the recipe in a folder names, if the recipe is valid. Maps lie beside the recipe.
+pub(crate) fn named_map(folder: &Folder) -> Option<String> {
+    let text = read::bytes(&folder.inside(names::RECIPE).ok()?, INPUT_BYTES).ok()?;
+    let recipe = Recipe::from_toml(&String::from_utf8_lossy(&text)).ok()?;
+    map_of(&recipe).filter(|name| !name.contains(['/', '\\'])).cloned()
 }

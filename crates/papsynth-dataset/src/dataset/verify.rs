@@ -6,14 +6,14 @@ use std::io::{BufRead, BufReader};
 use std::ops::Range;
 
 use papsynth::key::STREAM_VERSION;
-use papsynth::recipe::{self, Recipe};
+use papsynth::recipe::Recipe;
 use serde::Serialize;
 
 use super::contents::{Finding, Fix};
 use super::manifest::{Entry, Manifest};
 use super::merge::{self, manifest_sha256};
 use super::record::{WRITER, read_record, recorded_shards};
-use super::set::{Dataset, INPUT_BYTES};
+use super::set::{Dataset, INPUT_BYTES, map_of};
 use crate::bytes::sha256;
 use crate::error::Error;
 use crate::files::{Check, FileRecord, Folder, Location};
@@ -141,9 +141,8 @@ fn verify_in(
         let defect = folder.defect(file, Check::Hashes)?;
         findings.extend(defect.map(|message| Finding::damaged(&file.path, message)));
     }
-    if merged.is_empty() {
-        listed.extend(dataset.given().map(str::to_owned).chain(named_map(folder)));
-    }
+    // The input files belong to the data set, also before the first merge.
+    listed.extend(dataset.given().map(str::to_owned));
     let inputs = input_findings(&dataset, &merged)?;
     let inputs_match = inputs.is_empty();
     findings.extend(inputs);
@@ -249,36 +248,21 @@ fn input_findings(dataset: &Dataset, merged: &[FileRecord]) -> Result<Vec<Findin
         findings.push(Finding::damaged(names::MANIFEST, "its categories differ from those of the recipe"));
     }
     let named = map_of(&recipe);
-    match (named, &dataset.map) {
-        (Some(named), None) => {
-            findings.push(Finding::damaged(named, "missing from the list of files in manifest.json"))
+    if let Some(kept) = &dataset.map
+        && named != Some(kept)
+    {
+        findings.push(Finding::damaged(kept, "listed in manifest.json, but not written by papsynth"));
+    } else if let Some(named) = named {
+        match record(named) {
+            None => findings.push(Finding::damaged(named, "missing from the list of files in manifest.json")),
+            // The name of a map contains the first digits of its SHA-256.
+            Some(file) if !named.contains(&format!("{:.16}", file.sha256)) => {
+                findings.push(Finding::damaged(named, "not the map that the recipe names"));
+            }
+            Some(_) => {}
         }
-        (_, Some(kept)) if named != Some(kept) => {
-            findings.push(Finding::damaged(kept, "listed in manifest.json, but not written by papsynth"));
-        }
-        // The name of a map contains the first digits of its SHA-256.
-        (Some(named), Some(_))
-            if record(named).is_some_and(|file| !named.contains(&format!("{:.16}", file.sha256))) =>
-        {
-            findings.push(Finding::damaged(named, "not the map that the recipe names"));
-        }
-        _ => {}
     }
     Ok(findings)
-}
-
-/// Returns the map that a recipe names.
-fn map_of(recipe: &Recipe) -> Option<&String> {
-    match &recipe.layout {
-        recipe::Layout::DensityMap { path } | recipe::Layout::Labels(recipe::Labels { path, .. }) => Some(path),
-        _ => None,
-    }
-}
-
-/// Returns the map that the recipe in a folder names, if the recipe is valid.
-fn named_map(folder: &Folder) -> Option<String> {
-    let text = read::bytes(&folder.inside(names::RECIPE).ok()?, INPUT_BYTES).ok()?;
-    map_of(&Recipe::from_toml(&String::from_utf8_lossy(&text)).ok()?).cloned()
 }
 
 /// Returns the records of the merged files, computed from the shards. Texts and compressed bytes depend on the release
