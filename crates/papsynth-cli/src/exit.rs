@@ -174,14 +174,16 @@ pub(crate) fn until_stopped<T>(stop: &AtomicBool, work: impl FnOnce() -> T) -> T
     const GRACE: Duration = Duration::from_millis(500);
     let (end, ended) = mpsc::channel::<()>();
     std::thread::scope(|scope| {
-        scope.spawn(move || {
+        let watch = move || {
             while ended.recv_timeout(Duration::from_millis(50)) == Err(mpsc::RecvTimeoutError::Timeout) {
                 if stop.load(Ordering::SeqCst) && ended.recv_timeout(GRACE) == Err(mpsc::RecvTimeoutError::Timeout) {
                     ExitError::interrupted(ErrorReport::new("stopped; no file was written")).print();
                     std::process::exit(INTERRUPTED.into());
                 }
             }
-        });
+        };
+        // If the system does not start the thread, a stop takes effect when the work notices it.
+        let _ = std::thread::Builder::new().spawn_scoped(scope, watch);
         // Ends the watching thread on return, and after a panic.
         let _end = end;
         work()

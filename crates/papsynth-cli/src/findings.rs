@@ -36,7 +36,12 @@ pub(crate) fn check(dir: &Path, findings: &[Finding]) -> Result<(), ExitError> {
              `papsynth merge`"
                 .to_owned(),
         ),
-        (Fix::Generate, "to repair frames, run the command that wrote them with --verify".to_owned()),
+        (
+            Fix::Generate,
+            "to repair frames, run `papsynth generate` or `papsynth slide make` again with --verify, or the command \
+             that wrote them (`convert`, `rerender`, `sweep`) with a new folder"
+                .to_owned(),
+        ),
         (Fix::Clean, format!("`papsynth clean {dir}` removes temporary files of interrupted runs")),
         (Fix::CleanUntracked, format!("`papsynth clean {dir} --untracked` would delete the untracked files")),
     ]

@@ -27,7 +27,7 @@ pub(crate) fn run(args: &Inspect) -> Result<(), ExitError> {
         return Ok(());
     }
     let message = format!("{}: damaged: {}", args.dir.display(), damaged.join(", "));
-    let help = "to repair them, run the command that wrote the data set with --verify";
+    let help = "`papsynth verify` lists all findings and the commands that repair them";
     Err(ExitError::with_help(message, help))
 }
 

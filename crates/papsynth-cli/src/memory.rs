@@ -2,9 +2,11 @@
 
 use std::fs;
 
+use papsynth_dataset::Layout;
 use papsynth_dataset::memory::{MemoryEstimate, MemoryPlan, available, format_bytes};
 
 use crate::exit::{self, ExitError};
+use crate::setup::Setup;
 
 /// Fraction of the available memory that a run uses without `--max-memory`.
 const FRACTION: f64 = 0.8;
@@ -90,6 +92,20 @@ pub(crate) fn fit(
         exit::note(format!("{used} of {threads} threads are used, to stay below {may} ({source})"));
     }
     Ok(fit)
+}
+
+/// Returns the number of frames, at most `workers`, that fit into memory at the same time.
+///
+/// # Errors
+/// If not even one fits.
+pub(crate) fn frames_at_once(setup: &Setup, layout: &Layout, workers: usize) -> Result<usize, ExitError> {
+    let recipe = &setup.recipe.recipe;
+    let need = MemoryEstimate::of(recipe, &setup.model, layout);
+    let fit = fit(&need, setup.threads, (workers, false), None, |Budget { bytes, source }| {
+        let help = "smaller fields, fewer cells, one plane, monochrome light and less oversampling need less memory";
+        ExitError::with_help(format!("{} ({source})", need.too_large(recipe, bytes)), help)
+    });
+    Ok(fit?.workers)
 }
 
 /// Checks that the address-space limit leaves room for a recipe and a model.

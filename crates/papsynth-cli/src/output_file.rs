@@ -40,6 +40,9 @@ impl<'a> OutputFile<'a> {
             let message = format!("{}: is a folder; expected the name of a file", path.display());
             return Err(ExitError::input(message));
         }
+        if path == Path::new("-") {
+            return Err(ExitError::input("--out -: expected the name of a file; standard output is not supported"));
+        }
         // Opening a pipe could block forever.
         if path.exists() && !path.is_file() {
             let message = format!("{}: not a regular file; expected the name of a file", path.display());

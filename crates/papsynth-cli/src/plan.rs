@@ -1,14 +1,16 @@
 //! `papsynth plan`: the cost of a data set.
 
 use std::collections::BTreeMap;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::PathBuf;
 use std::sync::Mutex;
-use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use papsynth_dataset::{Check, Dataset, Format, Layout, Progress};
 
 use crate::args::Plan;
-use crate::exit::{self, ExitError};
+use crate::exit::{self, ErrorReport, ExitError};
 use crate::memory;
 use crate::setup::{Setup, run_of};
 use crate::words::{counted, size};
@@ -17,12 +19,16 @@ use crate::words::{counted, size};
 /// is used.
 const T: [f64; 15] = [12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26, 2.23, 2.20, 2.18, 2.16, 2.14, 2.13];
 
+/// Largest number of temporary folders of one process number that earlier runs can have left.
+const MAX_SCRATCH: u32 = 1000;
+
 pub(crate) fn run(args: &Plan) -> Result<(), ExitError> {
     if let Some(price) = args.per_core_hour.filter(|price| !(*price >= 0.0 && price.is_finite())) {
         return Err(ExitError::input(format!("--per-core-hour: {price} is out of range: expected 0 or more")));
     }
     let setup = Setup::load(&args.engine, None)?;
     let (layout, _) = args.layout.layout(args.frames);
+    memory::frames_at_once(&setup, &layout, 1)?;
     let scratch = Scratch::new()?;
     let samples = sample(args, &setup, &layout, &scratch)?;
     exit::print(&table(args, &setup, &layout, &samples))
@@ -44,10 +50,11 @@ fn sample(args: &Plan, setup: &Setup, layout: &Layout, scratch: &Scratch) -> Res
     let layout = Layout { frames_per_shard: 1, ..layout.clone() };
     let dataset = Dataset::create_or_resume(&scratch.0, &setup.info(args.engine.seed, &layout))?;
     let times = Mutex::new(vec![Instant::now()]);
-    let stop = AtomicBool::new(false);
-    let run = run_of(frames.clone(), 1, &stop);
+    let run = run_of(frames.clone(), 1, exit::stop_flag()?);
     let report = |_: Progress| times.lock().unwrap_or_else(|e| e.into_inner()).push(Instant::now());
-    dataset.generate(&setup.engine, &run, &report).map_err(|error| setup.error(error))?;
+    if dataset.generate(&setup.engine, &run, &report).map_err(|error| setup.error(error))?.stopped {
+        return Err(ExitError::interrupted(ErrorReport::new("stopped; no file was written")));
+    }
     let times = times.into_inner().unwrap_or_else(|e| e.into_inner());
     let seconds = times.windows(2).skip(1).map(|pair| (pair[1] - pair[0]).as_secs_f64()).collect();
     let mut bytes = BTreeMap::new();
@@ -122,26 +129,48 @@ fn duration(seconds: f64) -> String {
 }
 
 /// A temporary folder, removed on drop.
-struct Scratch(std::path::PathBuf);
+struct Scratch(PathBuf);
 
 impl Scratch {
+    /// Creates a folder; an existing one, which another run may have left, is not used.
     fn new() -> Result<Self, ExitError> {
-        let path = std::env::temp_dir().join(format!("papsynth-plan-{}", std::process::id()));
-        std::fs::create_dir_all(&path).map_err(|error| ExitError::file("write", &path, &error))?;
-        Ok(Self(path))
+        let name = |number: u32| format!("papsynth-plan-{}-{number}", std::process::id());
+        let mut paths = (0..MAX_SCRATCH).map(|number| std::env::temp_dir().join(name(number)));
+        loop {
+            let Some(path) = paths.next() else {
+                let message = format!("{}: too many folders papsynth-plan-*", std::env::temp_dir().display());
+                return Err(ExitError::with_help(message, "delete those of earlier runs"));
+            };
+            match fs::create_dir(&path) {
+                Ok(()) => return Ok(Self(path)),
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => (),
+                Err(error) => return Err(ExitError::file("write", &path, &error)),
+            }
+        }
     }
 }
 
 impl Drop for Scratch {
     fn drop(&mut self) {
         // The system removes temporary files that remain.
-        let _ = std::fs::remove_dir_all(&self.0);
+        let _ = fs::remove_dir_all(&self.0);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_the_own_temporary_folder_is_used_and_removed() {
+        let [first, second] = [Scratch::new().unwrap(), Scratch::new().unwrap()];
+        let (kept, removed) = (first.0.join("kept.txt"), second.0.clone());
+        fs::write(&kept, "kept").unwrap();
+        drop(second);
+        assert!(kept.exists() && !removed.exists());
+        drop(first);
+        assert!(!kept.exists());
+    }
 
     #[test]
     fn the_format_of_a_file_follows_from_its_path() {

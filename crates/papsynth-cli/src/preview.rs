@@ -5,13 +5,12 @@ use std::path::Path;
 use papsynth::key::Key;
 use papsynth::scene::Scene;
 use papsynth::{Error, Finished, Frame, Plane};
-use papsynth_dataset::memory::MemoryEstimate;
 use papsynth_dataset::{Layout, RgbImage};
 
 use crate::args::{EngineArgs, Preview, Render};
 use crate::exit::{self, ExitError};
 use crate::input_file;
-use crate::memory::{self, Budget};
+use crate::memory;
 use crate::output_file::{Kind, OutputFile};
 use crate::report::Spinner;
 use crate::setup::Setup;
@@ -25,7 +24,7 @@ const GAP_GREY: u8 = 255;
 pub(crate) fn run(args: &Preview) -> Result<(), ExitError> {
     let out = OutputFile::check(&args.out, Kind::Image, args.force)?;
     let setup = Setup::load(&args.engine, None)?;
-    check_memory(&setup)?;
+    memory::frames_at_once(&setup, &Layout::default(), 1)?;
     let key = Key { seed: args.engine.seed, index: args.index };
     let scene = setup.engine.scene(key).map_err(|error| setup.recipe.error(&error))?;
     let middle = scene.planes_um.len() / 2;
@@ -69,17 +68,6 @@ pub(crate) fn render(args: Render) -> Result<(), ExitError> {
     let (levels, scene) = (frame.image(), &frame.finished.scene);
     out.write_levels(&levels, scene.view.width, scene.channels(), scene.camera.bits, scene.view.pixel_um)?;
     print_size(&args.out, scene)
-}
-
-/// Checks that one frame fits into memory.
-pub(crate) fn check_memory(setup: &Setup) -> Result<(), ExitError> {
-    let recipe = &setup.recipe.recipe;
-    let need = MemoryEstimate::of(recipe, &setup.model, &Layout::default());
-    let fit = memory::fit(&need, setup.threads, (1, false), None, |Budget { bytes, source }| {
-        let help = "smaller fields, fewer cells, one plane, monochrome light and less oversampling need less memory";
-        ExitError::with_help(format!("{} ({source})", need.too_large(recipe, bytes)), help)
-    });
-    fit.map(drop)
 }
 
 fn image(setup: &Setup, scene: Scene, mut keep: impl FnMut(&Plane)) -> Result<Finished, ExitError> {

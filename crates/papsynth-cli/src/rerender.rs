@@ -9,6 +9,7 @@ use toml::Table;
 
 use crate::args::{Convert, EngineArgs, RecipeArgs, Rerender};
 use crate::exit::{self, ExitError};
+use crate::memory;
 use crate::report::FrameCounter;
 use crate::setup::{Setup, run_of};
 use crate::words::{frames_written, ranges};
@@ -19,6 +20,7 @@ const IMAGING: [&str; 6] = ["background", "camera", "focus", "light", "optics", 
 pub(crate) fn run(args: &Rerender) -> Result<(), ExitError> {
     let source = Dataset::open(&args.dir)?;
     source.check_inputs()?;
+    source.check_finished()?;
     let frames: Vec<u64> = image_paths(&source)?.into_keys().collect();
     let seed = source.identity().seed;
     let before = load(args, seed, false)?;
@@ -109,12 +111,13 @@ pub(crate) fn render(
     quiet: bool,
     stop: &AtomicBool,
 ) -> Result<Outcome, ExitError> {
+    let workers = memory::frames_at_once(setup, layout, setup.threads)?;
     let dataset = Dataset::create_or_resume(out, &setup.info(seed, layout))?;
     let mut sum = Outcome { present: 0, written: 0, stopped: false };
     let count = frames.iter().map(|range| range.end - range.start).sum();
     let counter = FrameCounter::start(quiet, "rendering frames", count);
     for frames in frames {
-        let run = run_of(frames.clone(), setup.threads, stop);
+        let run = run_of(frames.clone(), workers, stop);
         let outcome = dataset.generate(&setup.engine, &run, &|_| counter.step());
         let outcome = outcome.map_err(|error| setup.error(error))?;
         sum.present += outcome.present;

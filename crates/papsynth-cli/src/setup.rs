@@ -1,5 +1,6 @@
 //! The engine of a command line.
 
+use std::error::Error as _;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
@@ -69,9 +70,12 @@ impl Setup {
         if self.threads == 1 {
             return Threads::One;
         }
-        // An existing pool is used instead; the output does not depend on the number of threads.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build_global();
-        Threads::All
+        // The output does not depend on the number of threads: an existing pool may be used instead or, if the system
+        // starts no threads, only the current one.
+        match rayon::ThreadPoolBuilder::new().num_threads(self.threads).build_global() {
+            Err(error) if error.source().is_some() => Threads::One,
+            _ => Threads::All,
+        }
     }
 }
 

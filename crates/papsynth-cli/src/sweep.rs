@@ -9,6 +9,7 @@ use papsynth_dataset::{Dataset, image_paths, write_file};
 
 use crate::args::Sweep;
 use crate::exit::{self, ExitError};
+use crate::memory;
 use crate::output_file::{Kind, OutputFile};
 use crate::rerender::render;
 use crate::setup::Setup;
@@ -50,6 +51,7 @@ pub(crate) fn run(args: &Sweep) -> Result<(), ExitError> {
     let setups = combinations.iter().map(|values| setup(args, &axes, values)).collect::<Result<Vec<_>, _>>()?;
     check_out(&args.out, count)?;
     for setup in &setups {
+        memory::frames_at_once(setup, &layout, 1)?;
         let key = Key { seed: args.engine.seed, index: 0 };
         setup.engine.scene(key).map_err(|error| setup.recipe.error(&error))?;
     }
@@ -98,9 +100,11 @@ fn check_out(out: &Path, count: usize) -> Result<(), ExitError> {
         let kind = entry.file_type().map_err(|error| ExitError::file("read", &entry.path(), &error))?;
         let number = name.parse().ok().filter(|number| *number < count && name == set_name(*number));
         let is_set = kind.is_dir() && number.is_some();
-        if name == TABLE && kind.is_file() {
-            OutputFile::check(&entry.path(), Kind::Text(TABLE_BEGINS, "the table of a sweep"), false)?;
-        } else if !is_set && !name.starts_with('.') {
+        let is_table = name == TABLE && kind.is_file() && {
+            let table = Kind::Text(TABLE_BEGINS, "the table of a sweep");
+            OutputFile::check(&entry.path(), table, false).is_ok()
+        };
+        if !is_table && !is_set && !name.starts_with('.') {
             return refuse(&name);
         }
     }

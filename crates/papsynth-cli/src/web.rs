@@ -4,6 +4,7 @@ use std::process::{Command, Stdio};
 
 use papsynth::Inputs;
 use papsynth::recipe::Preset;
+use papsynth_dataset::Layout;
 use papsynth_study::{Group, Interval, Pool, Row, Session, Side, State, StudyParams, Summary, breakdown_table, table};
 use papsynth_web::{Error, Server, serve_study};
 
@@ -11,7 +12,7 @@ use crate::args::{Study, View, Workbench};
 use crate::exit::{self, ErrorReport, ExitError};
 use crate::setup::Setup;
 use crate::words::counted;
-use crate::{generate, memory, preview};
+use crate::{generate, memory};
 
 /// Opens a page in the default browser.
 fn open(address: &str) {
@@ -48,7 +49,7 @@ pub(crate) fn view(args: &View) -> Result<(), ExitError> {
 /// `papsynth workbench`: a recipe and its image, in the browser.
 pub(crate) fn workbench(args: &Workbench) -> Result<(), ExitError> {
     let setup = Setup::load(&args.engine, None)?;
-    preview::check_memory(&setup)?;
+    memory::frames_at_once(&setup, &Layout::default(), 1)?;
     let threads = setup.threads_of_a_frame();
     let params = papsynth_web::WorkbenchParams {
         recipe: setup.recipe.recipe,

@@ -77,6 +77,7 @@ impl MemoryEstimate {
             [_, most] => recipe.camera.pixel_um.bounds()[0] * recipe.camera.binning_px.bounds()[0] / most,
         };
         let is_stack = most(&recipe.focus.planes) > 1.0;
+        let range_um = (most(&recipe.focus.planes) - 1.0) * most(&recipe.focus.step_um);
         let (samples, is_filtered, is_exact) = match &recipe.optics {
             Optics::Gaussian(_) => (1.0, false, false),
             Optics::BrightField(Microscope { oversampling, imaging, .. }) => {
@@ -90,7 +91,7 @@ impl MemoryEstimate {
             LightSection::Colour(_) => (3.0, 3.0),
         };
         let grid = samples * samples;
-        let mut a_pixel = 10.0 + 25.0 * channels + 4.0 * grid * lights;
+        let mut a_pixel = 10.0 + 23.0 * channels + 4.0 * grid * lights;
         if is_stack {
             a_pixel += 11.0 * channels;
             if layout.has(Format::Webdataset) {
@@ -102,12 +103,13 @@ impl MemoryEstimate {
         if is_exact {
             a_pixel += 700.0 * grid;
         }
-        // Samples of a cell on the grid of the optics.
+        // Samples of a cell: one in each pixel, and on the grid of the optics in the nucleus.
         let of_cell = |size: f64| {
             let side = CELL_UM * size / pixel_um;
-            side * side * grid
+            side * side * (3.0 + 0.25 * grid)
         };
         let area_mm2 = recipe.largest_populated_mm2();
+        let visible = (pixels * pixel_um * pixel_um * 1e-6 / area_mm2).min(1.0);
         let size = |class: &str, mix: &CellMix| {
             model.classes.get(class).map_or_else(|| most(&mix.size), |class| class.relative_size(mix))
         };
@@ -116,14 +118,16 @@ impl MemoryEstimate {
         let count: f64 = cells.iter().map(|(count, _)| count).sum();
         let all: f64 = cells.iter().map(|(count, samples)| count * samples).sum();
         let largest = cells.iter().map(|(_, samples)| *samples).fold(0.0, f64::max);
-        // Bytes for each sample of a cell: kept between the planes of a stack; buffers of one thread, reused for all
-        // objects; images that wait for those of other threads, with margins as large as the cell.
+        // Bytes for each sample of a cell: kept between the planes of a stack, more for a larger range, which has more
+        // sizes of the blur; buffers of one thread, reused for all objects; images that wait for those of other
+        // threads, with margins as large as the cell.
+        let kept = lights * (6.0 + 0.85 * range_um);
         let (kept, buffers, waiting) = match (is_filtered, lights > 1.0) {
             (false, _) => (0.0, 8.0, 8.0),
-            (true, false) => (25.0, 136.0, 8.0 / grid),
-            (true, true) => (116.0, 560.0, 24.0 / grid),
+            (true, false) => (kept, 70.0, 8.0 / grid),
+            (true, true) => (kept, 150.0, 24.0 / grid),
         };
-        let objects = SMALL_OBJECTS + all * (6.4 + if is_stack { kept } else { 0.0 });
+        let objects = SMALL_OBJECTS + all * (7.5 * visible + if is_stack { kept } else { 0.0 });
         let frame = pixels * a_pixel + objects + largest * buffers;
         let shared = pixels * a_pixel + objects + largest * waiting * count.min(MAX_ACTIVE_OBJECTS);
         let [frame, shared, thread] = [frame, shared, largest * buffers].map(|bytes| SAFETY_FACTOR * bytes);

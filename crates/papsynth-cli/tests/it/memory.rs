@@ -39,6 +39,7 @@ fn the_estimate_is_an_upper_bound_within_a_factor() {
         format!("--threads 1 {} --set focus.planes=3", square(1024, 1)),
         format!("--threads 1 {} --set focus.planes=9 --format webdataset", square(1024, 1)),
         format!("--threads 1 {} --set focus.planes=3 --set light.kind=colour", square(768, 1)),
+        format!("--threads 1 {} --set focus.planes=128 --set focus.step_um=1", square(256, 1)),
         format!("--threads 2 {}", square(1024, 4)),
         format!("--threads 4 {}", square(1024, 1)),
         format!("--threads 4 {} --set light.kind=colour", square(768, 1)),
@@ -133,5 +134,24 @@ fn an_address_space_limit_is_an_error_or_is_kept() {
         let is_rejected = run.code == 2 && run.err.contains("address-space limit") && run.err.contains("MiB");
         assert!(run.code == 0 || is_rejected, "{kilobytes}: {} {}", run.code, run.err);
         let _ = std::fs::remove_dir_all(bench.path("out"));
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn commands_that_render_refuse_a_field_that_does_not_fit() {
+    let bench = Bench::new("memory-commands");
+    let size = "--set field.width_px=6000 --set field.height_px=6000 --threads 1";
+    for command in [
+        "preview --out look.png",
+        "generate --out set --frames 1",
+        "plan --frames 2 --samples 2",
+        "sweep --out sets --frames 1 --vary focus.centre_um=0,1",
+    ] {
+        let run = bench.run_within(2_000_000, &format!("{command} {size}"));
+        assert!(run.code == 2 && run.err.contains("6000 x 6000 pixels"), "{command}: {}", run.err);
+    }
+    for name in ["look.png", "set", "sets"] {
+        assert!(!bench.path(name).exists(), "{name}");
     }
 }

@@ -540,3 +540,20 @@ fn submit_prints_scripts_and_rejects_invalid_arguments() {
         assert_eq!(bench.run(wrong).code, 2, "{wrong}");
     }
 }
+
+#[test]
+fn unfinished_data_sets_are_not_taken_for_complete_ones() {
+    let bench = Bench::new("unfinished");
+    let generate = format!("generate --out out --frames 4 {TINY}");
+    bench.good(&format!("{generate} --task 0/2"));
+    bench.good(&format!("generate --out whole --frames 4 --seed 5 {TINY}"));
+    let commands = ["convert out --out new --format cellpose", "rerender out --out new", "judge whole out --out new"];
+    let built = if cfg!(feature = "judge") { 3 } else { 2 };
+    for command in &commands[..built] {
+        let run = bench.run(command);
+        assert!(run.code == 2 && run.err.contains("out: the data set is not finished"), "{command}: {}", run.err);
+        assert!(!bench.path("new").exists(), "{command}");
+    }
+    bench.good(&generate);
+    bench.good("convert out --out new --format cellpose");
+}

@@ -64,7 +64,7 @@ fn a_slide_of_several_tasks_is_finalized_and_verified() {
     assert_eq!(bench.files("slide"), bench.files("other"));
     fs::remove_dir_all(bench.path("slide")).unwrap();
     bench.good(&format!("{make} --task 0/2"));
-    rejected(&bench, "slide finalize slide", "shards are missing or damaged");
+    rejected(&bench, "slide finalize slide", "missing or damaged shards: 2 of 4");
     assert_eq!(bench.good("status slide --missing").out, "1,3\n");
     assert_eq!(bench.good("status slide --missing --tasks 2").out, "1\n");
     bench.good(&format!("{make} --task 1/2"));

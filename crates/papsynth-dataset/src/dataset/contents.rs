@@ -108,10 +108,32 @@ impl Dataset {
     /// If a file cannot be read.
     pub fn is_finished(&self) -> Result<bool, Error> {
         let manifest = Manifest::read(&self.folder)?;
-        if manifest.frames == 0 || manifest.shards != recorded_shards(&self.folder)?.len() as u64 {
+        if manifest.frames == 0 || manifest.shards != self.recorded()? {
             return Ok(false);
         }
         Ok(self.folder.first_defect(&manifest.files, Check::Sizes)?.is_none())
+    }
+
+    /// Checks that [`finish`](Self::finish) has merged all recorded frames. A data set whose generation was interrupted
+    /// has frames that are not merged.
+    ///
+    /// # Errors
+    /// If the number of merged shards is not that of the records, or a file cannot be read.
+    pub fn check_finished(&self) -> Result<(), Error> {
+        let (merged, recorded) = (Manifest::read(&self.folder)?.shards, self.recorded()?);
+        if merged == recorded && merged > 0 {
+            return Ok(());
+        }
+        let message = format!(
+            "the data set is not finished: manifest.json has {merged} merged shards, and `shards` has {recorded}; run \
+             the command that writes it again, or `papsynth merge` if all frames are generated"
+        );
+        Err(Error::folder(self.path(), message))
+    }
+
+    /// Returns the number of recorded shards.
+    fn recorded(&self) -> Result<u64, Error> {
+        Ok(recorded_shards(&self.folder)?.len() as u64)
     }
 }
 

@@ -19,7 +19,7 @@ use crate::truth::{Document, FrameSummary};
 /// recipe, model and seed are copied unchanged. Calls `report` after each frame, in order.
 ///
 /// # Errors
-/// If `from` is not a complete data set, its recipe or model was changed, its formats lack images that `layout` needs
+/// If `from` is not a finished data set, its recipe or model was changed, its formats lack images that `layout` needs
 /// (noise-free images, planes of stacks), or a file cannot be read or written.
 pub fn convert(
     from: &Path,
@@ -86,6 +86,7 @@ fn begin(source: &Dataset, to: &Path, layout: &Layout) -> Result<Dataset, Error>
     let Dataset { folder, identity, categories, map, .. } = source;
     let input = |name: &str| Ok::<_, Error>((name.to_owned(), read::bytes(&folder.inside(name)?, INPUT_BYTES)?));
     source.check_inputs()?;
+    source.check_finished()?;
     let mut inputs = vec![input(names::RECIPE)?, input(names::MODEL)?];
     inputs.extend(map.as_deref().map(input).transpose()?);
     Dataset::begin(to, identity.clone(), layout.clone(), categories.clone(), map.clone(), &inputs)
@@ -95,9 +96,6 @@ fn frames_in(source: &Dataset) -> Result<Vec<(u64, u64)>, Error> {
     let mut frames = Vec::new();
     for shard in source.shards()? {
         frames.extend(record(source, shard)?.frames.iter().map(|frame| (frame.index, shard)));
-    }
-    if frames.is_empty() {
-        return refuse(source, "the data set has no complete frame".to_owned());
     }
     Ok(frames)
 }

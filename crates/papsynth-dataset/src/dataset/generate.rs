@@ -4,6 +4,7 @@ use std::iter::StepBy;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread::Builder;
 
 use papsynth::key::Key;
 use papsynth::profile::{Profile, Stage};
@@ -124,11 +125,15 @@ impl Dataset {
                 }
             }
         };
-        if workers <= 1 {
+        std::thread::scope(|scope| {
+            for _ in 1..workers {
+                // Threads that the system does not start are not needed: the others do the work.
+                if Builder::new().spawn_scoped(scope, work).is_err() {
+                    break;
+                }
+            }
             work();
-        } else {
-            std::thread::scope(|scope| (0..workers).for_each(|_| drop(scope.spawn(work))));
-        }
+        });
         outcome.into_inner().unwrap_or_else(PoisonError::into_inner)
     }
 

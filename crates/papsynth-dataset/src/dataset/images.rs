@@ -257,12 +257,12 @@ fn difference(one: &Truth, other: &Truth) -> Option<String> {
 /// table `NAME.csv` of `y,x` points next to the image. `frames.csv` lists the group of each image.
 ///
 /// # Errors
-/// If there is no image, the folder cannot be read, or its tables are invalid.
+/// If there is no image, the data set is not finished, the folder cannot be read, or its tables are invalid.
 pub fn field_files(folder: &Path) -> Result<Vec<FieldFile>, Error> {
     if folder.join(names::MANIFEST).exists() { of_dataset(folder) } else { files_in(folder) }
 }
 
-/// Returns the frames of a complete data set; for stacks, their extended-depth-of-field images.
+/// Returns the frames of a finished data set; for stacks, their extended-depth-of-field images.
 fn of_dataset(path: &Path) -> Result<Vec<FieldFile>, Error> {
     let dataset = Dataset::open(path)?;
     let Dataset { folder, layout, .. } = &dataset;
@@ -270,6 +270,7 @@ fn of_dataset(path: &Path) -> Result<Vec<FieldFile>, Error> {
         let message = format!("the layout is {layout}; the format `folder` with labels is needed to read fields");
         return Err(Error::folder(path, message));
     }
+    dataset.check_finished()?;
     let mut fields = Vec::new();
     for shard in recorded_shards(folder)? {
         let record = dataset.record_or_finding(shard, Check::Sizes)?.map_err(|finding| {
@@ -291,8 +292,5 @@ fn of_dataset(path: &Path) -> Result<Vec<FieldFile>, Error> {
             });
         }
     }
-    match fields.is_empty() {
-        true => Err(Error::folder(path, "the data set has no complete frame")),
-        false => Ok(fields),
-    }
+    Ok(fields)
 }

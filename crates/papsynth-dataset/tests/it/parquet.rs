@@ -102,7 +102,7 @@ fn the_table_equals_the_csv_and_has_the_masks() {
     let info =
         DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout: &Layout::default() };
     let error = Dataset::create_or_resume(plain.path(), &info).unwrap_err().to_string();
-    assert!(error.contains("objects also as Parquet"), "{error}");
+    assert!(error.contains("--no-parquet"), "{error}");
 }
 
 #[test]
@@ -136,7 +136,7 @@ fn rows_are_frames_in_files_by_split() {
             for (found, object) in list(&row[3]).iter().zip(objects) {
                 let found = list(found);
                 assert_eq!(found[0], Field::UInt(object.id));
-                assert_eq!(rle::decode(text(&found[16]), WIDTH, HEIGHT).unwrap(), object.amodal);
+                assert_eq!(rle::decode(text(&found[18]), WIDTH, HEIGHT).unwrap(), object.amodal);
             }
             seen.push(index);
         }
@@ -184,6 +184,6 @@ fn images_are_read_only_from_files_that_match_their_record() {
     fs::write(scratch.join("huggingface/data").join(name), bytes).unwrap();
     let dataset = Dataset::open(scratch.path()).unwrap();
     let error = dataset.planes(&summary, 0, &mut |_, _| ()).unwrap_err().to_string();
-    assert!(error.contains("another content"), "{error}");
+    assert!(error.contains("the SHA-256 differs"), "{error}");
     assert!(!verify(scratch.path(), None).unwrap().findings.is_empty());
 }
