@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use papsynth::recipe::Recipe;
+use papsynth::scene::Scene;
 use papsynth_dataset::Layout;
 use papsynth_dataset::memory::{MemoryEstimate, MemoryPlan, available, format_bytes};
 
@@ -99,7 +101,20 @@ pub(crate) fn fit(
 /// # Errors
 /// If not even one fits.
 pub(crate) fn frames_at_once(setup: &Setup, layout: &Layout, workers: usize) -> Result<usize, ExitError> {
-    let recipe = &setup.recipe.recipe;
+    frames_of(&setup.recipe.recipe, setup, layout, workers)
+}
+
+/// Checks that a scene fits into memory. Its size may differ from that of the recipe.
+pub(crate) fn check_scene(setup: &Setup, scene: &Scene) -> Result<(), ExitError> {
+    let mut recipe = setup.recipe.recipe.clone();
+    let field = &mut recipe.field;
+    (field.width_px, field.height_px) = ((scene.view.width as f64).into(), (scene.view.height as f64).into());
+    (field.pixel_um, field.magnification) = (scene.view.pixel_um.into(), 0.0.into());
+    recipe.focus.planes = (scene.planes_um.len() as f64).into();
+    frames_of(&recipe, setup, &Layout::default(), 1).map(drop)
+}
+
+fn frames_of(recipe: &Recipe, setup: &Setup, layout: &Layout, workers: usize) -> Result<usize, ExitError> {
     let need = MemoryEstimate::of(recipe, &setup.model, layout);
     let fit = fit(&need, setup.threads, (workers, false), None, |Budget { bytes, source }| {
         let help = "smaller fields, fewer cells, one plane, monochrome light and less oversampling need less memory";

@@ -62,6 +62,7 @@ pub(crate) fn render(args: Render) -> Result<(), ExitError> {
     let scene = read(&args.scene)?;
     let engine = EngineArgs { recipe: args.recipe, model: args.model, seed: scene.key.seed, threads: args.threads };
     let setup = Setup::load(&engine, None)?;
+    memory::check_scene(&setup, &scene)?;
     let mut planes = Vec::new();
     let finished = image(&setup, scene, |plane| planes.push(plane.clone()))?;
     let frame = Frame { planes, finished };

@@ -151,6 +151,12 @@ fn commands_that_render_refuse_a_field_that_does_not_fit() {
         let run = bench.run_within(2_000_000, &format!("{command} {size}"));
         assert!(run.code == 2 && run.err.contains("6000 x 6000 pixels"), "{command}: {}", run.err);
     }
+    bench.good("generate --out small --frames 1 --scenes --set field.width_px=64 --set field.height_px=64");
+    let scene = std::fs::read_to_string(bench.path("small/scenes/000000.json")).unwrap();
+    let larger = scene.replacen("\"width\":64", "\"width\":6000", 1).replacen("\"height\":64", "\"height\":6000", 1);
+    std::fs::write(bench.path("larger.json"), larger).unwrap();
+    let run = bench.run_within(2_000_000, "render --scene larger.json --out look.png --threads 1");
+    assert!(run.code == 2 && run.err.contains("6000 x 6000 pixels"), "{}", run.err);
     for name in ["look.png", "set", "sets"] {
         assert!(!bench.path(name).exists(), "{name}");
     }
