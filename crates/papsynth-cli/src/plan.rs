@@ -5,6 +5,7 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::PathBuf;
 use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use papsynth_dataset::{Check, Dataset, Format, Layout, Progress};
@@ -29,8 +30,10 @@ pub(crate) fn run(args: &Plan) -> Result<(), ExitError> {
     let setup = Setup::load(&args.engine, None)?;
     let (layout, _) = args.layout.layout(args.frames);
     memory::frames_at_once(&setup, &layout, 1)?;
+    // Before the folder, so that a signal cannot leave it.
+    let stop = exit::stop_flag()?;
     let scratch = Scratch::new()?;
-    let samples = sample(args, &setup, &layout, &scratch)?;
+    let samples = sample(args, &setup, &layout, &scratch, stop)?;
     exit::print(&table(args, &setup, &layout, &samples))
 }
 
@@ -44,13 +47,19 @@ struct Samples {
 }
 
 #[expect(clippy::disallowed_methods, reason = "the time is printed and reaches no image")]
-fn sample(args: &Plan, setup: &Setup, layout: &Layout, scratch: &Scratch) -> Result<Samples, ExitError> {
+fn sample(
+    args: &Plan,
+    setup: &Setup,
+    layout: &Layout,
+    scratch: &Scratch,
+    stop: &AtomicBool,
+) -> Result<Samples, ExitError> {
     // The first frame also fills caches, so it is not timed.
     let frames = 0..args.samples + 1;
     let layout = Layout { frames_per_shard: 1, ..layout.clone() };
     let dataset = Dataset::create_or_resume(&scratch.0, &setup.info(args.engine.seed, &layout))?;
     let times = Mutex::new(vec![Instant::now()]);
-    let run = run_of(frames.clone(), 1, exit::stop_flag()?);
+    let run = run_of(frames.clone(), 1, stop);
     let report = |_: Progress| times.lock().unwrap_or_else(|e| e.into_inner()).push(Instant::now());
     if dataset.generate(&setup.engine, &run, &report).map_err(|error| setup.error(error))?.stopped {
         return Err(ExitError::interrupted(ErrorReport::new("stopped; no file was written")));

@@ -40,10 +40,7 @@ impl Style {
     fn bar(self, steps: u64) -> ProgressBar {
         let target = if self == Self::Bar { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(steps), target);
-        if self == Self::Bar {
-            // The elapsed time advances between steps.
-            bar.enable_steady_tick(Duration::from_secs(1));
-        }
+        redraw(&bar, Duration::from_secs(1));
         bar
     }
 }
@@ -244,7 +241,7 @@ impl Spinner {
         let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed} elapsed");
         let bar = ProgressBar::with_draw_target(None, target).with_message(what);
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
-        bar.enable_steady_tick(Duration::from_millis(200));
+        redraw(&bar, Duration::from_millis(200));
         Self(bar)
     }
 }
@@ -252,6 +249,18 @@ impl Spinner {
 impl Drop for Spinner {
     fn drop(&mut self) {
         self.0.finish_and_clear();
+    }
+}
+
+/// Redraws a visible bar at regular intervals, so that its time advances between steps.
+fn redraw(bar: &ProgressBar, every: Duration) {
+    if bar.is_hidden() {
+        return;
+    }
+    // The bar has a thread for it, and panics if the system does not start one.
+    if let Ok(probe) = std::thread::Builder::new().spawn(|| ()) {
+        let _ = probe.join();
+        bar.enable_steady_tick(every);
     }
 }
 

@@ -60,10 +60,11 @@ pub(crate) fn run(args: &Sweep) -> Result<(), ExitError> {
     let mut table = csv::Writer::from_writer(Vec::new());
     // Writing to memory does not fail, and all records have the same length.
     let _ = table.write_record(COLUMNS.into_iter().chain(axes.iter().map(|axis| axis.field.as_str())));
-    for (number, (setup, values)) in setups.iter().zip(&combinations).enumerate() {
+    // Each engine is dropped after its data set, with the memory that it keeps between frames.
+    for (number, (setup, values)) in setups.into_iter().zip(&combinations).enumerate() {
         let name = set_name(number);
         let out = args.out.join(&name);
-        render(setup, args.engine.seed, std::slice::from_ref(&frames), &layout, &out, args.quiet, stop)?;
+        render(&setup, args.engine.seed, std::slice::from_ref(&frames), &layout, &out, args.quiet, stop)?;
         for (index, (slide, file)) in image_paths(&Dataset::open(&out)?)? {
             let fixed = [name.as_str(), &index.to_string(), &slide.to_string(), &file];
             let _ = table.write_record(fixed.into_iter().chain(values.iter().copied()));
