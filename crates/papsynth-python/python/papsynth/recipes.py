@@ -955,17 +955,17 @@ class LayoutLabels(Section):
 
 @dataclass(kw_only=True, slots=True)
 class Leukocytes(Section):
-    """Leukocytes (paper, section "White blood cells", Eqs. 6, 7, Fig. 9). The defaults come from 24 extended-focus
-    fields of liquid-based cytology with 0.33 µm per pixel. 51 single dark bodies have these values at 10 %, 50 % and 90
-    %, with the outline at half of the contrast: - area 26, 39 and 51 µm², solidity 0.91, 0.92 and 0.94, eccentricity
-    0.36, 0.60 and 0.76; - absorbance of the core 0.32, 0.47 and 0.65, its standard deviation inside the core 0.032,
-    0.058 and 0.085; - absorbance 1 to 2 µm outside the outline 0.05, 0.09 and 0.22. The logarithm of the absorbance of
-    the core has a standard deviation of 0.16 within and 0.24 between fields. The slope of the edge is 0.14 to 0.20 of
-    the contrast per pixel. The area with an absorbance above 0.045, cytoplasm included, is 96, 122 and 156 µm² at 25 %,
-    50 % and 75 % of 35 isolated bodies of eight normal fields. The fractions of degenerated and pyknotic leukocytes,
-    and of those on cells, are estimates by eye. There are about 45 leukocytes per mm². About two thirds of the clusters
-    are single leukocytes; one to three in a hundred clusters have more than 10. The centres of touching leukocytes are
-    5 to 10 µm apart.
+    """Leukocytes (paper, section "White blood cells", Eqs. 6, 7, Fig. 9). The defaults come from 24 EDF fields of
+    liquid-based cytology with 0.33 µm per pixel. 51 single dark bodies have these values at 10 %, 50 % and 90 %, with
+    the outline at half of the contrast: - area 26, 39 and 51 µm², solidity 0.91, 0.92 and 0.94, eccentricity 0.36, 0.60
+    and 0.76; - absorbance of the core 0.32, 0.47 and 0.65, its standard deviation inside the core 0.032, 0.058 and
+    0.085; - absorbance 1 to 2 µm outside the outline 0.05, 0.09 and 0.22. The logarithm of the absorbance of the core
+    has a standard deviation of 0.16 within and 0.24 between fields. The slope of the edge is 0.14 to 0.20 of the
+    contrast per pixel. The area with an absorbance above 0.045, cytoplasm included, is 96, 122 and 156 µm² at 25 %, 50
+    % and 75 % of 35 isolated bodies of eight normal fields. The fractions of degenerated and pyknotic leukocytes, and
+    of those on cells, are estimates by eye. There are about 45 leukocytes per mm². About two thirds of the clusters are
+    single leukocytes; one to three in a hundred clusters have more than 10. The centres of touching leukocytes are 5 to
+    10 µm apart.
     """
 
     clusters: Abundance | None = None
@@ -1387,10 +1387,10 @@ class SlideSection(Section):
 @dataclass(kw_only=True, slots=True)
 class Smudges(Section):
     """Amorphous debris: granular clumps and fibrous shreds of remains of cells, mucus and bacteria, and folded shreds
-    of cytoplasm without a nucleus. In 24 extended-focus fields of liquid-based cytology, seven clumps per mm² have an
-    absorbance of 0.22 or more. At 10 %, 50 % and 90 %, their absorbance is 0.23, 0.27 and 0.39, and their area at half
-    of the contrast is 21, 44 and 115 µm². The eight normal fields have five dark folded shreds of 12 to 30 µm, counted
-    by eye: about five per mm².
+    of cytoplasm without a nucleus. In 24 EDF fields of liquid-based cytology, seven clumps per mm² have an absorbance
+    of 0.22 or more. At 10 %, 50 % and 90 %, their absorbance is 0.23, 0.27 and 0.39, and their area at half of the
+    contrast is 21, 44 and 115 µm². The eight normal fields have five dark folded shreds of 12 to 30 µm, counted by eye:
+    about five per mm².
     """
 
     count: Abundance | None = None
